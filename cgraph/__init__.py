@@ -65,8 +65,7 @@ if TYPE_CHECKING:
         tanh as tanh,
         where as where,
     )
-    from .program.functions.compile import compile as compile
-    from .program.functions.compiled import Compiled as Compiled
+    from .program.functions.compiled import Compiled as Compiled, compile as compile
     from .program.loop import loop as loop
     from .simplification.simplify import simplify as simplify, specialize as specialize
     from .util.caches import clear_caches as clear_caches

@@ -24,8 +24,15 @@ if TYPE_CHECKING:
     from .explain.lint.lint import Lint as Lint
     from .explain.why_nan import WhyNan as WhyNan
     from .operations.operation import columns as columns
-    from .program.derivatives.linearization import Linearization as Linearization, Linearized as Linearized
-    from .program.derivatives.tape import Tape as Tape, run_passes as run_passes
+    from .program.derivatives.jvp import Passes as Passes
+    from .program.derivatives.transpose import (
+        TURNS as TURNS,
+        Along as Along,
+        Tape as Tape,
+        adjoint as adjoint,
+        run_passes as run_passes,
+        tangent as tangent,
+    )
     from .program.runners.batch_code import LaneCode as LaneCode
     from .simplification.identities import shortened as shortened
     from .simplification.ordered_terms import ink as ink

@@ -59,7 +59,8 @@ if TYPE_CHECKING:
     from .operations.operation import MathML as MathML, Op as Op
     from .operations.register import register as register
     from .operations.table import OPS as OPS
-    from .program.derivatives.transforms import program_jvp as program_jvp, program_vjp as program_vjp
+    from .program.derivatives.jvp import program_jvp as program_jvp
+    from .program.derivatives.transpose import program_vjp as program_vjp
     from .program.many import many as many
     from .program.program import Program as Program
     from .program.runners.choose_runner import runner as runner

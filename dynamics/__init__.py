@@ -97,15 +97,15 @@ if TYPE_CHECKING:
     from .multibody.trees.structure import Subtree as Subtree
     from .multiprecision.reference import reference as reference
     from .scenes.scenes import Scene as Scene
+    from .simulation.applied_force import SampledController as SampledController
     from .simulation.ensembles.ensemble import Ensemble as Ensemble
     from .simulation.ensembles.simulate_many import simulate_many as simulate_many
     from .simulation.events.event import Event as Event
-    from .simulation.gradients.gradient import gradient as gradient
-    from .simulation.gradients.gradient_many import gradient_many as gradient_many
+    from .simulation.gradients.gradient import gradient as gradient, gradient_many as gradient_many
     from .simulation.gradients.sensitivities import sensitivities as sensitivities
     from .simulation.outcome import MotionError as MotionError
-    from .simulation.prepared_motion import PreparedMotion as PreparedMotion
-    from .simulation.sampled_controller import SampledController as SampledController
+    from .simulation.run import Run as Run
+    from .simulation.run_options import Options as Options
     from .simulation.simulate import prepare as prepare, simulate as simulate
     from .simulation.trajectory import SimulationWarning as SimulationWarning, Trajectory as Trajectory
     from .systems.constraints import ConstraintError as ConstraintError

@@ -16,7 +16,7 @@ import viz
 from cgraph.extend import OPS
 from cgraph.operations.functions import function
 from dynamics.multiprecision.solution import Reference
-from dynamics.simulation.sampled_controller import HeldForces
+from dynamics.simulation.applied_force import HeldForces
 from viz.graph_drawing.render import RenderError
 
 ARM, TWO = dyn.planar_arm([1.0], [1.0]), dyn.planar_arm([1.0, 0.5], [1.0, 1.0])
@@ -235,9 +235,9 @@ CALLS = {
         dyn.prepare, ARM, "rk4", max_step=None, rtol=None, atol=None, events=(), dense_output=False, tau=0.0,
         first_step=None, form="velocity", varied=(), **RUNS
     ),
-    "dyn.PreparedMotion.end": call(MOTION.end, [0.1], [0.0], 0.02, 0.0, parameters=None),
-    "dyn.PreparedMotion.ends": call(MOTION.ends, [[0.1], [0.2]], [0.0], 0.02, 0.0, parameters=None, workers=1),
-    "dyn.PreparedMotion.start": call(MOTION.start, [0.1], [0.0], 0.02, 0.0, parameters=None),
+    "dyn.Run.end": call(MOTION.end, [0.1], [0.0], 0.02, 0.0, parameters=None),
+    "dyn.Run.ends": call(MOTION.ends, [[0.1], [0.2]], [0.0], 0.02, 0.0, parameters=None, workers=1),
+    "dyn.Run.start": call(MOTION.start, [0.1], [0.0], 0.02, 0.0, parameters=None),
     "dyn.MotionSteps.propagate_until": call(MOTION.start([0.1], [0.0], 1.0).propagate_until, 0.02),
     "dyn.gradient": call(
         dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "euler", running=lambda q, qd, tau, t: q[0],
@@ -462,7 +462,7 @@ WORDS = {
 
 # Records: plain data that the library fills in, or that is checked when a mechanism is made of it.
 RECORDS = """
-    cg.Compiled cg.Counts cg.Edge cg.Node dyn.Ensemble dyn.Force dyn.JointForce dyn.PreparedMotion
+    cg.Compiled cg.Counts cg.Edge cg.Node dyn.Ensemble dyn.Force dyn.JointForce dyn.Options dyn.Run
     dyn.QuasiVelocities dyn.Subtree dyn.Trajectory dyn.Verdict extend.MathML extend.Statement extend.StatementRow
     extend.Notation extend.Op
 """
@@ -476,6 +476,7 @@ LEFT_OUT = """cg.as_jax cg.to_casadi cg.to_jax cg.to_torch cg.recording_lines cg
     dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along dyn.JointFriction.check
     dyn.Actuator.along dyn.Actuator.check extend.Builder extend.Runner extend.require_length extend.Runner.advancing
     extend.Runner.read extend.Runner.write extend.effects extend.Runner.lane_code extend.Formulas.lines
+    extend.Runner.text extend.Runner.bind_pass extend.Runner.columns extend.Program.listing
     extend.Names.called extend.Names.formula extend.Names.inputs_of extend.Names.line extend.Names.meant
     extend.Names.short extend.Names.shown extend.Names.text"""
 

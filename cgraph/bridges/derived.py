@@ -7,8 +7,7 @@ from collections.abc import Callable
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..core.node import variable
-from ..program.functions.compile import compile
-from ..program.functions.compiled import Compiled
+from ..program.functions.compiled import Compiled, compile
 
 
 def require_compiled(what: str, fn: object) -> None:

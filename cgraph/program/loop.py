@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from ..autodiff.direction_split import direction_split
 from ..core.checks import GraphError
 from ..core.evaluation import Array, real_array
 from ..core.graph import Graph
-from ..core.node import CONSTANT, Node, variable
-from ..core.traversal import rebuild, topological
+from ..core.node import Node
+from ..core.traversal import topological
 from ..util.require import require_graph, require_mapping, require_sequence
 from .program import Program
 from .runners.choose_runner import runner
@@ -29,7 +28,7 @@ class Loop:
     carry : dict of str to str
         {input: the output whose value it has in the next pass}.
     invariants : Graph or None
-        The operations on constant inputs alone, which are computed once before the first pass.
+        The operations on constant inputs alone, which are computed once before the first pass; None without any.
 
     Examples
     --------
@@ -53,17 +52,23 @@ class Loop:
         self.graph, self.carry = graph, dict(carry)
         self._moving = [graph.input_names.index(name) for name in carry]
         self._held = [k for k, name in enumerate(graph.input_names) if name not in carry]
-        moving, held = ([graph.inputs[k] for k in chosen] for chosen in (self._moving, self._held))
-        wanted = [graph.outputs[carry[name]] for name in carry]
-        self.invariants, stand_ins = _loop_invariants(wanted, held)
-        self._fixed = [graph.input_names.index(name) for name in self.invariants.input_names] if self.invariants else []
-        new = rebuild(wanted, stand_ins, lambda n, args: Node(n.op, args, n.label, name=n.name))
-        one_pass = Graph(
-            [*moving, *held, *stand_ins.values()], dict(zip(carry, [new[node] for node in wanted], strict=True))
+        moving, held = ([graph.inputs[k] for k in places] for places in (self._moving, self._held))
+        outputs = {name: graph.outputs[carry[name]] for name in carry}
+        self._split = split = direction_split(Graph([*held, *moving], outputs), len(moving))
+        program = Program(
+            {"carry": len(moving), "held": len(split.primal.outputs)},
+            [Call(split.linear, ("held", "carry"), ("carry",))],
+            record=["carry"],
         )
-        registers = {"carry": len(moving), "held": len(held), "invariant": len(stand_ins)}
-        program = Program(registers, [Call(one_pass, ("carry", "held", "invariant"), ("carry",))], record=["carry"])
-        self._runner = runner(program, backend, fast=fast, fma=fma).prepared()
+        self._runner = runner(program, backend, fast=fast, fma=fma)
+        self._runner.run(self._runner.memory({}), 0)  # makes the code that a call runs
+
+    @property
+    def invariants(self) -> Graph | None:
+        """What is computed before the first pass."""
+        outputs = {name: node for name, node in self._split.primal.outputs.items() if node.args}
+        reached = set(topological(list(outputs.values())))
+        return Graph([node for node in self._split.primal.inputs if node in reached], outputs) if outputs else None
 
     def __call__(self, x: ArrayLike, passes: int, every: int = 1) -> Array:
         """Run the passes from one start.
@@ -94,7 +99,7 @@ class Loop:
 
         The last axis counts the starts, as in `Compiled.batch`.
         """
-        return self._runner.run_many(self._memory(X, 2), passes, every).rows
+        return self._runner.run(self._memory(X, 2), passes, every).rows
 
     def _memory(self, x: ArrayLike, dimensions: int) -> Array:
         values = real_array("x", x)
@@ -102,31 +107,13 @@ class Loop:
         if values.ndim != dimensions or values.shape[0] != count:
             wanted = f"({count},)" if dimensions == 1 else f"({count}, N)"
             raise GraphError(f"x must have shape {wanted}, one row for each input, got {values.shape}")
-        registers = {"carry": values[self._moving], "held": values[self._held]}
-        if self.invariants is not None:
-            fixed = values[self._fixed]
-            held = dict(zip(self.invariants.input_names, fixed.tolist() if dimensions == 1 else fixed, strict=True))
-            registers["invariant"] = np.array(list(self.invariants.evaluate(held).values()))
-        return self._runner.memory(registers, None if dimensions == 1 else values.shape[1])
-
-
-def _loop_invariants(outputs: Sequence[Node], held: Sequence[Node]) -> tuple[Graph | None, dict[Node, Node]]:
-    """The operations on `held` alone that the outputs need: as a graph, and {operation: variable in its place}."""
-    nodes = topological(outputs)
-    constant = {node for node in nodes if node.op is CONSTANT}
-    fixed = constant | set(held)
-    for node in nodes:
-        if node.args and fixed.issuperset(node.args):
-            fixed.add(node)
-    used = [arg for node in nodes if node not in fixed for arg in node.args] + list(outputs)
-    taken = {node.name for node in nodes}
-    names = (name for name in (f"invariant{k}" for k in itertools.count()) if name not in taken)
-    invariants = [node for node in dict.fromkeys(used) if node in fixed and node.args]
-    if not invariants:
-        return None, {}
-    reached = set(topological(invariants))
-    graph = Graph([node for node in held if node in reached], {f"{k}": node for k, node in enumerate(invariants)})
-    return graph, {node: variable(next(names)) for node in invariants}
+        memory = self._runner.memory({"carry": values[self._moving]}, None if dimensions == 1 else values.shape[1])
+        if self._held:
+            held, register = values[self._held], self._runner.read(memory, "held")
+            named = zip(self._split.primal.input_names, held.tolist() if dimensions == 1 else held, strict=True)
+            for k, numbers in enumerate(self._split.primal.evaluate(dict(named)).values()):
+                register[k] = numbers
+        return memory
 
 
 def loop(

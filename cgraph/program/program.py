@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..util.explain_failure import explain_failure
 from . import table  # noqa: F401 (which fills the table)
-from .statement import (
-    Statement,
-    bodies_of,
-    length_of,
-    names_in,
-    reads_and_writes,
-    require_length,
-    require_once,
-    row_of,
-)
+from .listing import Listing
+from .statement import Statement, bodies_of, length_of, names_in, reads_and_writes, require_length, require_once, row_of
 from .statements.call import Call
 
 
@@ -58,8 +51,8 @@ class Program:
             for name in names:
                 length_of(self.registers, where, name)
         require_once("the feed", self.feed)
-        for what, number in (("record_if", self.record_if), ("stop", self.stop)):
-            if number is not None:
+        for what in ("record_if", "stop"):
+            if (number := getattr(self, what)) is not None:
                 require_length(self.registers, what, number, 1)
         for statement in self.statements():
             row = row_of(statement)
@@ -76,6 +69,30 @@ class Program:
             statement = waiting.pop()
             yield statement
             waiting += reversed([each for body in bodies_of(statement) for each in body])
+
+    def listing(self, names: Mapping[str, Graph] = MappingProxyType({})) -> str:
+        """The program as a person would write it: lengths of registers, then the statements of a pass.
+
+        Short graphs are formulas of registers, element by element where these hold several numbers; a longer one is a
+        function with its number of operations.  names: {name of a function: its graph}; others are f1, f2, ..
+
+        >>> import cgraph as cg
+        >>> from cgraph.extend import Call, If, Program
+        >>> x = cg.variable("x")
+        >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+        >>> print(Program({"x": 1, "more": 1}, [If("more", (halve,))], record=["x"]).listing())
+        1 number: x, more
+        each pass:
+            if more > 0:
+                x = 1/2 * x
+        record: x
+        """
+        text = Listing(self.registers, names)
+        fed = [f"before each pass: {', '.join(self.feed)} from the feed"] if self.feed else []
+        condition = f" if {self.record_if} > 0" if self.record_if else ""
+        record = f"record{condition}: {', '.join(self.record) or 'nothing'}"
+        stop = [f"stop if {self.stop} != 0"] if self.stop else []
+        return "\n".join([*text.registers(), *fed, "each pass:", *text.body(self.body), record, *stop])
 
     @property
     def width(self) -> int:
@@ -95,12 +112,9 @@ class Program:
 
     def graphs(self) -> list[Graph]:
         """The graphs that statements run, each once."""
-        graphs: dict[int, Graph] = {}
-        for statement in self.statements():
-            if name := row_of(statement).graph:
-                graph = getattr(statement, name)
-                graphs.setdefault(id(graph), graph)
-        return list(graphs.values())
+        named = [(statement, row_of(statement).graph) for statement in self.statements()]
+        graphs = [getattr(statement, name) for statement, name in named if name]
+        return list({id(graph): graph for graph in graphs}.values())
 
 
 def whole_graph(program: Program, x: str) -> Graph | None:
@@ -127,10 +141,8 @@ def live_registers(statements: Sequence[Statement], read: Set[str], after: dict[
     for statement in reversed(statements):
         row, bodies = row_of(statement), bodies_of(statement)
         if bodies:  # which may run no time at all, or again
-            live |= {
-                *names_in(statement, row.reads),
-                *[name for body in bodies for name in live_registers(body, set(), {})],
-            }
+            inside = [name for body in bodies for name in live_registers(body, set(), {})]
+            live |= {*names_in(statement, row.reads), *inside}
             after[id(statement)] = frozenset(live)
             for body in bodies:
                 live_registers(body, live, after)

@@ -108,7 +108,7 @@ class Execution:
         for statement in statements:
             row = row_of(statement)
             rule = row.run if self.many < 0 else row.beside
-            assert rule is not None, "Runner.run_many has asked"
+            assert rule is not None, "Runner.run has asked"
             rule(statement, state, self)
 
     def positive(self, values: Sequence[float] | Array) -> bool:

@@ -40,7 +40,7 @@ def _bodies(file: str, kind: str, masked: str, **more: Any) -> dict[str, Any]:
 ROWS = [  # read by columns: kind, reads, writes; in Python, check; as machine code; of many memories; more
     StatementRow(
         call.Call, ("inputs",), ("outputs",), call.run_call, call.check_call,
-        text=call.call_text, beside=call.call_beside, graph="graph", **_derivatives("call_rules", "call", "elements"),
+        text=call.call_text, beside=call.call_beside, graph="graph", **_derivatives("call_rules", "elements"),
     ),
     StatementRow(
         call.Map, ("shared", "inputs", "asked"), ("outputs",), call.run_map, call.check_elements,
@@ -52,11 +52,11 @@ ROWS = [  # read by columns: kind, reads, writes; in Python, check; as machine c
     ),
     StatementRow(
         matrix.Factor, ("matrix",), ("matrix", "pivots"), matrix.run_factor, matrix.check_matrix,
-        text=matrix.factor_text, beside=matrix.run_factor, **_derivatives("matrix_rules", "factor"),
+        text=matrix.factor_text, beside=matrix.run_factor, **_derivatives("linear_rules", "factor"),
     ),
     StatementRow(
         matrix.Solve, ("matrix", "pivots", "vector"), ("vector",), matrix.run_solve, matrix.check_matrix,
-        text=matrix.solve_text, beside=matrix.run_solve, **_derivatives("matrix_rules", "solve"),
+        text=matrix.solve_text, beside=matrix.run_solve, **_derivatives("linear_rules", "solve"),
     ),
     StatementRow(
         control.If, ("register",), (), control.run_if, control.check_control, bodies=("body", "otherwise"),
@@ -69,24 +69,24 @@ ROWS = [  # read by columns: kind, reads, writes; in Python, check; as machine c
     StatementRow(  # with the derivative of its equations in place of its turns
         control.FixedPoint, ("register",), (), control.run_while, control.check_control, bodies=("body",),
         text=control.while_text, beside=control.run_while,
-        **_bodies("fixed_point_rules", "fixed_point", "masked_while"),
+        **_bodies("control_rules", "fixed_point", "masked_while"),
     ),
     StatementRow(
-        memory.Take, ("source",), ("target",), memory.run_take, memory.check_take,
-        text=memory.take_text, beside=memory.run_take, **_derivatives("memory_rules", "take", "moved"),
+        memory.Take, ("source",), ("target",), memory.run_numbers, memory.check_numbers,
+        text=memory.numbers_text, beside=memory.run_numbers, **_derivatives("linear_rules", "take", "moved"),
     ),
     StatementRow(
-        memory.Scatter, ("source", "target"), ("target",), memory.run_scatter, memory.check_scatter,
-        text=memory.scatter_text, beside=memory.run_scatter, **_derivatives("memory_rules", "scatter", "moved"),
+        memory.Scatter, ("source", "target"), ("target",), memory.run_numbers, memory.check_numbers,
+        text=memory.numbers_text, beside=memory.run_numbers, **_derivatives("linear_rules", "scatter", "moved"),
     ),
     StatementRow(
-        memory.Push, ("stack", "count", "rows"), ("stack", "count"), memory.run_push, memory.check_stack,
-        text=memory.push_text, beside=memory.run_push, masked=_later("many", "masked_push"),
-        **_derivatives("memory_rules", "push", "moved"),
+        memory.Push, ("stack", "count", "rows"), ("stack", "count"), memory.run_stack, memory.check_stack,
+        text=memory.stack_text, beside=memory.run_stack, masked=_later("many", "masked_push"),
+        **_derivatives("linear_rules", "push", "moved"),
     ),
     StatementRow(
-        memory.Pop, ("stack", "count"), ("count", "rows"), memory.run_pop, memory.check_stack,
-        text=memory.pop_text, beside=memory.run_pop, **_derivatives("memory_rules", "pop", "moved"),
+        memory.Pop, ("stack", "count"), ("count", "rows"), memory.run_stack, memory.check_stack,
+        text=memory.stack_text, beside=memory.run_stack, **_derivatives("linear_rules", "pop", "moved"),
     ),
 ]
 # fmt: on

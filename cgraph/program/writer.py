@@ -1,12 +1,210 @@
-"""Writer: what the rules of statements write LLVM's text with."""
+"""LLVM's text of a program: a writer for the rules of statements, and the functions that these call."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
+from ..codegen.arithmetic import Arithmetic
 from ..codegen.function_writer import FunctionWriter, copied_bytes
-from .llvm_functions import Functions, Lengths
+from ..codegen.llvm_ir import libm_functions, write_graph
+from ..core.graph import Graph
+from ..core.node import Node
 from .statement import Lengths as Registers, Statement, row_of
+
+Lengths = tuple[int, ...]  # of the registers that are a function's arguments
+Text = Callable[[FunctionWriter, str], None]  # what writes a function of that name
+
+
+class Functions:
+    """The functions of one module, each written once.
+
+    Every function takes pointers to registers, inputs first: `void f(in0, in1, .., out0, out1, ..)`.
+    definitions: the lines of all functions.  width: of the vectors in which `map` goes through its elements.
+    quick: whether what is defined is to be compiled in little time, for it seldom runs.
+    """
+
+    def __init__(self, arithmetic: Arithmetic, width: int) -> None:
+        self.arithmetic, self.width = arithmetic, width
+        self.definitions: list[str] = []
+        self.quick = False
+        self._names: dict[tuple[object, ...], str] = {}
+
+    def call(
+        self,
+        graph: Graph,
+        registers: Lengths,
+        reads: Sequence[int],
+        writes: Sequence[int],
+        products: Mapping[Node, Node] | None = None,
+        *,
+        exact: bool = False,
+    ) -> str:
+        """y = graph(x), where of its registers some, end to end, are x, and some y; a register may be both.
+
+        products: see `instructions`.  exact: no product is joined with a sum.
+        """
+        arithmetic = self.arithmetic.unfused if exact else self.arithmetic
+        pointers = [f"%in{k}" for k in range(len(registers))]
+        places = [
+            _places(arithmetic.type, pointer, length) for pointer, length in zip(pointers, registers, strict=True)
+        ]
+        x, y = ([place for k in which for place in places[k]] for which in (reads, writes))
+        known = set(x)
+        again = {row for row, place in enumerate(y) if place in known}
+
+        def text(ir: FunctionWriter, name: str) -> None:
+            self._body(ir, name, graph, x, y, pointers, products=products, last=again)
+
+        key = (id(graph), registers, tuple(reads), tuple(writes), exact)
+        return self._define(key, "call", text, arithmetic, len(pointers), 0)
+
+    def map(
+        self,
+        graph: Graph,
+        shared: Lengths,
+        inputs: Lengths,
+        outputs: Lengths,
+        count: int,
+        apart: Sequence[bool] = (),
+        *,
+        asked: bool = False,
+    ) -> str:
+        """y[i] = graph(shared, x[i]) for i = 0 .. count - 1, whose number k in a register is at k count + i.
+
+        Where it can, a vector of elements at a time; results beyond the last one go to the register's padding.
+        apart: the inputs whose numbers have just been written one by one, and so are read: one load of them all would
+        wait until they are in the cache.  asked: the last input says how many elements matter.
+        """
+        one_each = max((*inputs, *outputs), default=1) <= count
+        in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
+        in_vectors = in_vectors and (one_each or count % self.width == 0)
+        arithmetic = self.arithmetic._replace(lanes=self.width, together=1) if in_vectors else self.arithmetic
+        same = [k for k, length in enumerate(inputs) if length == 1 != count]
+        gathered = [k for k, each in enumerate(apart) if each and in_vectors and inputs[k] == count]
+        first, one, vector = len(shared), self.arithmetic.type, arithmetic.type
+
+        def text(ir: FunctionWriter, name: str) -> None:
+            common, found = [f"%in{k}" for k in range(first)], [f"%in{first + k}" for k in range(len(inputs))]
+            for k in same if in_vectors else ():  # a vector of equal numbers
+                number = ir.spread(ir.load_at(found[k], "double"))
+                found[k] = ir.room()
+                ir.store_at(number, found[k])
+            gather = self._gather(vector, min(count, self.width)) if gathered else ""
+            brought = {k: ir.room() for k in gathered}
+            end = self._asked(ir, f"%in{first + len(inputs)}", count) if asked and self.arithmetic.lanes == 1 else count
+            with ir.loop(0, end, arithmetic.lanes if in_vectors else 1) as i:
+                for k in gathered:
+                    ir.store_at(ir.value(f"call {vector} @{gather}(ptr {ir.at(found[k], i, one)})"), brought[k])
+                sources = [brought.get(k, at if k in same else ir.at(at, i, one)) for k, at in enumerate(found)]
+                targets = [ir.at(f"%out{k}", i, one) for k in range(len(outputs))]
+                x = [place for at, length in zip(common, shared, strict=True) for place in _places(one, at, length)]
+                for k, (at, length) in enumerate(zip(sources, inputs, strict=True)):
+                    x += _places(one, at, max(1, length // count), 0 if k in same else count)
+                y = [
+                    place
+                    for at, length in zip(targets, outputs, strict=True)
+                    for place in _places(one, at, length // count, count)
+                ]
+                uniform = sum(shared) if in_vectors else 0
+                self._body(ir, name, graph, x, y, [*common, *sources, *targets], uniform=uniform)
+
+        key = ("map", id(graph), shared, inputs, outputs, count, tuple(gathered), asked)
+        return self._define(key, "map", text, arithmetic, first + len(inputs) + asked, len(outputs))
+
+    @staticmethod
+    def _asked(ir: FunctionWriter, register: str, count: int) -> str:
+        """The number of elements that a register asks for, from one to `count`."""
+        number, t = ir.load_at(register, "double"), "double"
+        for relation, bound in (("ogt", 1), ("olt", count)):
+            limit = f"{float(bound)!r}"
+            inside = ir.value(f"fcmp {relation} {t} {number}, {limit}")
+            number = ir.value(f"select i1 {inside}, {t} {number}, {t} {limit}")
+        return ir.value(f"fptosi {t} {number} to i64")
+
+    def _gather(self, t: str, size: int) -> str:
+        """`x -> the vector of x[0], .., x[size - 1]`, by a load for each, of which LLVM would make one."""
+        name = f"gathered{size}"
+
+        def text(arithmetic: Arithmetic) -> list[str]:
+            ir, vector = FunctionWriter(arithmetic), "poison"
+            for lane in range(size):
+                number = ir.value(f"load volatile double, ptr {ir.at('%x', lane)}, align 8")
+                vector = ir.value(f"insertelement {t} {vector}, double {number}, i32 {lane}")
+            return ir.function(f"internal {t} @{name}(ptr %x) nounwind noinline", f"{t} {vector}")
+
+        return self.text(name, text)
+
+    def total(self, count: int) -> str:
+        """y = x[0] + .. + x[count - 1], added up in this order from 0."""
+        t = self.arithmetic.type
+
+        def text(ir: FunctionWriter, _: str) -> None:
+            if not count:
+                ir.store_at(ir.number(0.0), "%out0")
+                return
+            with ir.loop(0, count) as i:
+                before = f"[ {ir.number(0.0)}, %start ], [ {i}.total, %{i[1:]}.again ]"
+                ir.line(f"{i}.sum = phi {t} {before}")
+                ir.line(f"{i}.total = fadd {t} {i}.sum, {ir.load_at(ir.at('%in0', i))}")
+            ir.store_at(f"{i}.total", "%out0")
+
+        return self._define(("total", count), "total", text, self.arithmetic, 1, 1)
+
+    def take(self, table: Sequence[int], places: Sequence[int] = ()) -> str:
+        """y[i] = x[table[i]], or y[places[i]]; where these are all, in order, they are left out."""
+        tables = [table] if tuple(places) in ((), tuple(range(len(table)))) else [table, places]
+
+        def text(ir: FunctionWriter, name: str) -> None:
+            for k, numbers in enumerate(tables):
+                listed = ", ".join(f"i64 {each}" for each in numbers)
+                self.definitions.append(f"@{name}.{k} = internal unnamed_addr constant [{len(table)} x i64] [{listed}]")
+            with ir.loop(0, len(table)) as i:
+                source, *target = [ir.load_at(ir.at(f"@{name}.{k}", i, "i64"), "i64") for k in range(len(tables))]
+                ir.store_at(ir.load_at(ir.at("%in0", source)), ir.at("%out0", target[0] if target else i))
+
+        return self._define(("take", *map(tuple, tables)), "take", text, self.arithmetic, 1, 1)
+
+    def _body(
+        self,
+        ir: FunctionWriter,
+        name: str,
+        graph: Graph,
+        x: Sequence[str],
+        y: Sequence[str],
+        pointers: Sequence[str],
+        **how: Any,
+    ) -> None:
+        """The graph in a function of that name, after what it calls; arguments: see `write_graph`."""
+        for line in write_graph(ir, name, graph, {"x": x, "y": y}, pointers, **how):
+            quick = self.quick and line.startswith("define")
+            self.definitions.append(line.replace("noinline {", "noinline optnone {") if quick else line)
+
+    def _define(
+        self, key: tuple[object, ...], kind: str, text: Text, arithmetic: Arithmetic, inputs: int, outputs: int
+    ) -> str:
+        """The name of the function of this key, which is written when it is first asked for."""
+        key, how = (*key, self.quick), " noinline optnone" if self.quick else ""
+        if key not in self._names:
+            name = self._names[key] = f"{kind}{len(self._names)}"
+            ir = FunctionWriter(arithmetic)
+            text(ir, name)  # which may define functions of its own
+            arguments = [f"%{side}{k}" for side, count in (("in", inputs), ("out", outputs)) for k in range(count)]
+            listed = ", ".join([f"ptr noalias {argument}" for argument in arguments])
+            self.definitions += ir.function(f"internal void @{name}({listed}) nounwind{how}")
+        return self._names[key]
+
+    def text(self, name: str, text: Callable[[Arithmetic], Sequence[str]]) -> str:
+        """A function of that name, whose lines `text` writes for the module's arithmetic."""
+        if (name,) not in self._names:
+            self._names[name,] = name
+            self.definitions += text(self.arithmetic)
+        return name
+
+
+def _places(t: str, pointer: str, count: int, step: int = 1) -> list[str]:
+    """Places of so many numbers of a register."""
+    return [f"{t}, ptr {pointer}, i64 {k * step}" for k in range(count)]
 
 
 class Writer(FunctionWriter):
@@ -14,7 +212,6 @@ class Writer(FunctionWriter):
 
     functions: those of the module, which statements call.  size: of a number in a register, in bytes.
     pointers: {register: its address}.  before: the statement that has been written last.
-    offsets: {register: its place in %memory}, where they all lie there.  alone: ids of graphs that one statement calls.
     """
 
     def __init__(self, registers: Registers, functions: Functions) -> None:
@@ -22,8 +219,6 @@ class Writer(FunctionWriter):
         self.registers, self.functions, self.size = registers, functions, 8 * self.lanes
         self.pointers = {name: f"%r{number}" for number, name in enumerate(registers)}
         self.before: Statement | None = None
-        self.offsets: Registers = {}
-        self.alone: frozenset[int] = frozenset()
 
     def run(self, statements: Sequence[Statement]) -> None:
         """Statements, one after another."""

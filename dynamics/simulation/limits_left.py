@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -78,63 +77,43 @@ class _Watched:
         return f"{left}, and is {self.value:.6g} {self.unit} at {self.at:.4g} s"
 
     def see(self, t_old: Array, t: Array, values: Array) -> None:
-        """Look at pieces from t_old to t, (T,), with these values, (T, k), at their nodes."""
-        over = np.maximum(self.ends[0] - values, values - self.ends[1])
-        beyond = (over > 0.0).any(axis=1)
-        hull, rounding = self._hull(values)
-        if math.isnan(self.first):
-            for row in np.flatnonzero(beyond | (hull > rounding)).tolist():
-                if (share := self._first(values[row], float(rounding[row]))) is not None:
-                    self.first = float(t_old[row] + share * (t[row] - t_old[row]))
-                    break
-        if beyond.any():
-            most, node = divmod(int(np.argmax(np.where(over > 0.0, over, 0.0))), over.shape[1])
-            share = float(_nodes(over.shape[1])[node])
-            self._note(float(values[most, node]), float(t_old[most]), float(t[most]), share)
-        for row in np.argsort(-hull).tolist():
-            if not hull[row] > self.most + rounding[row]:
-                break
-            for share in self._turns(_polynomial(values[row])):
-                value = float(_polynomial(values[row])(share))
-                if self._over(value) > rounding[row]:
-                    self._note(value, float(t_old[row]), float(t[row]), share)
+        """Look at pieces from t_old to t, (T,), with these values, (T, k), at their nodes.
 
-    def _over(self, value: float) -> float:
-        return max(self.ends[0] - value, value - self.ends[1])
-
-    def _note(self, value: float, t_old: float, t: float, share: float) -> None:
-        if self._over(value) > self.most:
-            self.most, self.value, self.at = self._over(value), value, t_old + share * (t - t_old)
-
-    def _hull(self, values: Array) -> tuple[Array, Array]:
-        """By how much the pieces are beyond at most, as the control points of their polynomials say; and rounding."""
+        The control points of a polynomial say by how much it is beyond at most: only such pieces are looked at.
+        """
         shares, degree = _nodes(values.shape[1]), values.shape[1] - 1
         k = np.arange(degree + 1)
         choose = np.array([math.comb(degree, each) for each in k])
         points = values @ np.linalg.inv(choose * shares[:, None] ** k * (1.0 - shares[:, None]) ** (degree - k)).T
-        hull = np.maximum(self.ends[0] - points.min(axis=1), points.max(axis=1) - self.ends[1])
-        return np.nan_to_num(hull, nan=-math.inf), ROUNDING * np.abs(values).max(axis=1)
+        hull = np.nan_to_num(np.maximum(self.ends[0] - points.min(axis=1), points.max(axis=1) - self.ends[1]), nan=-1.0)
+        rounding = ROUNDING * np.abs(values).max(axis=1) * (degree > 0)
+        for row in np.flatnonzero(hull > rounding).tolist() if math.isnan(self.first) else ():
+            beyond = self._beyond(values[row], float(rounding[row]))
+            if beyond:
+                self.first = float(t_old[row] + beyond[0][0] * (t[row] - t_old[row]))
+                break
+        for row in np.argsort(-hull).tolist():
+            if not hull[row] > self.most + rounding[row]:
+                break
+            for share, value in self._beyond(values[row], float(rounding[row])):
+                if (over := self._over(value)) > self.most:
+                    self.most, self.value, self.at = over, value, float(t_old[row] + share * (t[row] - t_old[row]))
 
-    def _first(self, values: Array, rounding: float) -> float | None:
-        """The share at which a piece is beyond first; None where it is not but for rounding."""
-        if self._over(float(values[0])) > 0.0:
-            return 0.0
-        polynomial, shares = _polynomial(values), _nodes(len(values))
-        meets = [share for end in self.ends if math.isfinite(end) for share in _real(polynomial - end)]
-        looks = sorted([0.0, *meets, *self._turns(polynomial), 1.0])
-        for before, look in itertools.pairwise(looks):
-            if self._over(float(polynomial(look))) > rounding:
-                return before
-        return next((float(s) for s, value in zip(shares, values, strict=True) if self._over(float(value)) > 0.0), None)
+    def _over(self, value: float) -> float:
+        return max(self.ends[0] - value, value - self.ends[1])
 
-    def _turns(self, polynomial: Polynomial) -> list[float]:
-        return _real(polynomial.deriv())
-
-
-def _polynomial(values: Array) -> Polynomial:
-    """That through the values at the nodes."""
-    shares = _nodes(len(values))
-    return Polynomial(np.linalg.solve(shares[:, None] ** np.arange(len(values)), values))
+    def _beyond(self, values: Array, rounding: float) -> list[tuple[float, float]]:
+        """Shares of a piece at which it is beyond, and values: where it begins to be, then its turns and its end."""
+        shares = _nodes(len(values))
+        polynomial = Polynomial(np.linalg.solve(shares[:, None] ** np.arange(len(values)), values))
+        exact = dict(zip(shares.tolist(), values.tolist(), strict=True))
+        looks = {share: float(polynomial(share)) for share in _real(polynomial.deriv())} | exact
+        beyond = sorted((share, value) for share, value in looks.items() if self._over(value) > rounding)
+        if beyond and beyond[0][0] > 0.0:
+            meets = [share for end in self.ends if math.isfinite(end) for share in _real(polynomial - end)]
+            begin = max([share for share in meets if share < beyond[0][0]], default=beyond[0][0])
+            beyond.insert(0, (begin, float(polynomial(begin))))
+        return beyond
 
 
 def _real(polynomial: Polynomial) -> list[float]:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph._shared import Array, nearest, real_array, real_number, require_flag
+from cgraph._shared import Array, nearest, or_nearest, real_array, real_number, require_flag
 
 from ..equations.states.initial_value import times_to_record
 from ..integrators import METHODS, MOST_STAGES, Method
@@ -27,6 +28,77 @@ ERROR_BOUND = 1e-3  # of the estimated error of equal steps, relative
 TABLES = 3  # that the rows are in at most at once, while they are put together
 SMALL_MEMORY = 2.0**24  # bytes, below which nobody asks how many are free
 MEMORY_SHARE = 0.9  # of the free memory
+
+
+class Options(TypedDict, total=False):
+    """Keywords by which a run is made, of `simulate`, `prepare`, `simulate_many`, `gradient` and their kin.
+
+    Parameters
+    ----------
+    t0 : float
+        Where the run starts [s], 0 by default.
+    t_span : array_like
+        (t0, t_end), as in SciPy, in place of the two.
+    dt : float
+        The largest of equal steps [s], 1e-3 by default: the steps between two recorded times are equal, so that the
+        last row is at t_end exactly.
+    max_step : float
+        The longest of chosen steps [s]; no limit by default.
+    rtol, atol : float, float or array_like
+        The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
+        one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
+        component has had so far, or a ten-thousandth of the largest coordinate or velocity, in whatever unit: of a
+        mechanism an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1.
+        A jump of a force in time is passed then, as well as a hundredth of the longest of the last steps allows. Of
+        equal steps the estimated error that is no cause of a warning, relative to the largest of a component over the
+        run; 1e-3 and 0 by default.
+    first_step : float
+        In place of the first step that the method chooses [s].
+    max_steps : float
+        Trials of steps, rejected ones too, after which the run stops.
+    estimate_error : bool
+        Of equal steps, whether runs beside, of steps two and four times as long, estimate their error
+        (`Stats.error`), which takes three quarters as long again; by default they do. The rows are the same without.
+    dense_output : bool
+        Whether to keep what lies between the rows, for `Trajectory.solution(t)`: some numbers a step for every one of
+        the state.
+    form : {"velocity", "momentum"}
+        What the steps are of: q and qd, or q and the momenta p = dL/dqd by Hamilton's equations, on which symplectic
+        methods then act as they are written. Events, controllers, rows and dense output are in q and qd all the same,
+        and the rows have p besides; `atol` of (m,) is for q and then p. Not with constraints.
+    backend : {"auto", "llvm", "python"}
+        "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
+    fma : bool
+        Whether the steps may fuse a product and a sum where the processor can, as in `cgraph.compile`. Without they
+        have the bits that they have in Python, in C and on any other machine with the same C library.
+    progress : bool
+        A progress line on standard error; by default on a terminal, for runs over a second.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> fine: dyn.Options = {"rtol": 1e-12, "t_span": (0.0, 2.0)}
+    >>> dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], **fine).q[-1].round(6)
+    array([0.01857])
+    """
+
+    t0: float
+    t_span: ArrayLike | None
+    dt: float | None
+    max_step: float | None
+    rtol: float | None
+    atol: ArrayLike | None
+    first_step: float | None
+    max_steps: float
+    estimate_error: bool | None
+    dense_output: bool
+    form: str
+    backend: str
+    fma: bool
+    progress: bool | None
+
+
+TAKEN = Options.__annotations__.keys() - {"t0", "t_span", "dense_output", "form"}  # by `RunOptions`
 
 
 @dataclass(frozen=True)
@@ -93,6 +165,22 @@ class RunOptions:
         if not (most >= 1.0 and (most == math.inf or most == int(most))):
             raise ValueError(f"max_steps must be a whole number, at least 1, or infinite, got {self.max_steps!r}")
         self.__dict__.update(span(self.t0, self.t_end, self.t_eval), max_steps=most)
+
+    @classmethod
+    def of(
+        cls,
+        method: str,
+        options: Mapping[str, Any],
+        t0: float = 0.0,
+        t_end: float = 1.0,
+        t_eval: ArrayLike | None = None,
+        without: Sequence[str] = (),
+    ) -> RunOptions:
+        """Those of a method and keywords of `Options`, but some.  Raises TypeError for a keyword that there is not."""
+        if unknown := [name for name in options if name not in TAKEN or name in without]:
+            known = [name for name in Options.__annotations__ if name not in without]
+            raise TypeError(f"there is no option {unknown[0]!r:.60} here; {or_nearest(unknown[0], known)}")
+        return cls(t_end, method, t0=t0, t_eval=t_eval, **options)
 
     def over(self, t0: float, t_end: float, t_eval: ArrayLike | None) -> RunOptions:
         """Options of another run. Raises as a run does for its times."""

@@ -55,7 +55,7 @@ def per_coordinate(
     if len(entries) != n:
         shown = ", ".join(names[:8]) + (", ..." if n > 8 else "")
         raise ValueError(f"{what} needs one number for each of {shown}: {n}, got {len(entries)}")
-    for name, number in zip(names, entries, strict=True):
+    for name, number in zip(names, entries[:1] if isinstance(value, numbers.Real) else entries, strict=False):
         if not math.isfinite(real_number(f"{what} of {name!r}", number)) or number < minimum:
             bound = f" and at least {minimum:g}" if math.isfinite(minimum) else ""
             raise ValueError(f"{what} must be finite{bound}, got {number!r} for {name!r}")

@@ -2,116 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ...core.graph import Graph
 from ..statement import Names
 from ..statements.call import Call, Map, Sum, elements, sizes
-from .adjoint import Adjoint
-from .products import split
-from .single_assignment import Assignment, Registers
-from .tangent import Tangent
+from .jvp import Assignment, Tangent, pushed, split
+from .transpose import Adjoint, pulled
 
-# tangents: y = f(x), y_dot = f'(x) x_dot
+Numbers = tuple[int, ...]
+
+
+def _parts(assignment: Assignment, lengths: Mapping[str, int]) -> tuple[Call | Map | Sum, Names, Numbers, Numbers]:
+    """The statement, the shared registers, and how many numbers each input and output has of an element."""
+    statement: Call | Map | Sum = assignment.statement  # type: ignore[assignment]
+    inputs, outputs = (tuple([lengths[name] for name in names]) for names in (statement.inputs, statement.outputs))
+    if isinstance(statement, Call):
+        return statement, (), inputs, outputs
+    inputs = (*[lengths[name] for name in statement.shared], *sizes(statement, lengths, statement.inputs))
+    if isinstance(statement, Map):
+        outputs = sizes(statement, lengths, statement.outputs)
+    return statement, statement.shared, inputs, outputs
 
 
 def push_elements(assignment: Assignment, tangent: Tangent) -> None:
     """y_dot[i] = f'(x[i]) x_dot[i], or their sum; a call is one of them."""
-    statement: Call | Map | Sum = assignment.statement  # type: ignore[assignment]
-    common: Names = () if isinstance(statement, Call) else statement.shared
-    names, first = (*common, *statement.inputs), len(common)
-    moving, lengths = tangent.moving(names), _in_element(statement, tangent)
+    statement, shared, lengths, outputs = _parts(assignment, tangent.lengths)
+    names, first = (*shared, *statement.inputs), len(shared)
+    moving = tuple([k for k, name in enumerate(names) if name in tangent.dots and tangent.lengths[name]])
     if not moving or tangent.active.isdisjoint(statement.outputs):
         return
-    product = tangent.products.pushed(statement.graph, lengths[0], moving, lengths[1])
-    if product.graph is None:
+    graph, kept = pushed(statement.graph, lengths, moving, outputs)
+    if graph is None:
         return
-    dots, of_all = [tangent.dots[names[k]] for k in moving], sum([k < first for k in moving])
-    others = (*statement.inputs, *dots[of_all:])
-    results = tuple([tangent.dot(statement.outputs[k]) for k in product.kept])
-    graph = _shared_first(product.graph, lengths[0], first, moving)
+    dots, of_all = tuple([tangent.dots[names[k]] for k in moving]), sum([k < first for k in moving])
+    inputs, results = (*statement.inputs, *dots[of_all:]), tuple([tangent.dot(statement.outputs[k]) for k in kept])
     if isinstance(statement, Call):
-        tangent.add(Call(graph, others, results))
-    else:
-        tangent.add(replace(statement, graph=graph, inputs=others, outputs=results, shared=(*common, *dots[:of_all])))
-
-
-def _in_element(statement: Call | Map | Sum, registers: Registers) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """The numbers of the registers that are inputs of the graph for one element, and of those that are its outputs."""
-    if isinstance(statement, Call):
-        return registers.of(statement.inputs), registers.of(statement.outputs)
-    inputs = (*registers.of(statement.shared), *sizes(statement, registers.lengths, statement.inputs))
-    if isinstance(statement, Map):
-        return inputs, sizes(statement, registers.lengths, statement.outputs)
-    return inputs, registers.of(statement.outputs)
-
-
-def _shared_first(graph: Graph, lengths: tuple[int, ...], first: int, moving: Sequence[int]) -> Graph:
-    """The graph with the inputs that are shared first: numbers, their tangents, then those of elements."""
-    groups = split(graph.inputs, [*lengths, *[lengths[k] for k in moving]])
-    common = [k < first for k in (*range(len(lengths)), *moving)]
-    order = [
-        node
-        for wanted in (True, False)
-        for group, is_common in zip(groups, common, strict=True)
-        for node in group
-        if is_common is wanted
-    ]
-    return Graph(order, graph.outputs) if first else graph
-
-
-# cotangents: x_bar += f'(x)^T y_bar
-
-
-def pull_call(assignment: Assignment, adjoint: Adjoint) -> None:
-    """x_bar += f'(x)^T y_bar."""
-    call: Call = assignment.statement  # type: ignore[assignment]
-    seeded, wanted = adjoint.seeded(call.outputs), adjoint.wanted(call.inputs)
-    if not seeded or not wanted:
+        tangent.add(Call(graph, inputs, results))
         return
-    product = adjoint.products.pulled(call.graph, adjoint.of(call.inputs), wanted, adjoint.of(call.outputs), seeded)
-    if product.graph is None:
-        return
-    bars = [adjoint.bar(call.inputs[k]) for k in product.kept]
-    values = call.outputs if product.with_outputs else ()
-    seeds = [adjoint.bars[call.outputs[k]] for k in seeded]
-    adjoint.add(Call(product.graph, (*call.inputs, *values, *seeds), tuple(bars)))
-    for k, bar in zip(product.kept, bars, strict=True):
-        adjoint.collect(call.inputs[k], bar)
+    if first:  # what is shared comes first: numbers, their tangents, then those of elements
+        groups = split(graph.inputs, [*lengths, *[lengths[k] for k in moving]])
+        order = sorted(zip([k >= first for k in (*range(len(lengths)), *moving)], groups, strict=True), key=_is_first)
+        graph = Graph([node for _, group in order for node in group], graph.outputs)
+    tangent.add(replace(statement, graph=graph, inputs=inputs, outputs=results, shared=(*shared, *dots[:of_all])))
+
+
+def _is_first(group: tuple[bool, Sequence[object]]) -> bool:
+    return group[0]
 
 
 def pull_elements(assignment: Assignment, adjoint: Adjoint) -> None:
-    """Cotangents of elements; their sum for a number that all elements share, or of length 1."""
-    statement: Map | Sum = assignment.statement  # type: ignore[assignment]
-    inputs, first = (*statement.shared, *statement.inputs), len(statement.shared)
-    count, one_each = elements(statement, adjoint.lengths), isinstance(statement, Map)
-    seeded, wanted = adjoint.seeded(statement.outputs), adjoint.wanted(inputs)
+    """x_bar[i] += f'(x[i])^T y_bar[i]; their sum for a number that all elements share, or of length 1."""
+    statement, shared, lengths, outputs = _parts(assignment, adjoint.lengths)
+    names, first = (*shared, *statement.inputs), len(shared)
+    count = 1 if isinstance(statement, Call) else elements(statement, adjoint.lengths)
+    seeded = tuple([k for k, name in enumerate(statement.outputs) if name in adjoint.bars])
+    wanted = tuple([k for k, name in enumerate(names) if name in adjoint.active and adjoint.lengths[name]])
     if not seeded or not wanted or not count:
         return
     if isinstance(statement, Map) and statement.asked:
         raise TypeError("a Map of as many elements as are asked for has no cotangents")
-    lengths, outputs = _in_element(statement, adjoint)
-    product = adjoint.products.pulled(statement.graph, lengths, wanted, outputs, seeded, summed=not one_each)
-    if product.graph is None:
+    total, rule = adjoint.rules.get(id(statement.graph), (0, None))
+    if not isinstance(statement, Call) or total != sum([outputs[k] for k in seeded]):
+        rule = None
+    graph, kept = pulled(statement.graph, rule, lengths, wanted, outputs, seeded)
+    if graph is None:
         return
     seeds = tuple([adjoint.bars[statement.outputs[k]] for k in seeded])
-    if product.with_outputs:
-        seeds = (*statement.outputs, *seeds)
-    wide = not one_each and any(length > 1 for length in outputs)  # of a Sum: the same for every element, end to end
-    shared, others = (
-        ((*statement.shared, *seeds), statement.inputs) if wide else (statement.shared, (*statement.inputs, *seeds))
-    )
-    nodes = product.graph.inputs
-    if wide:
+    if isinstance(statement, Call):
+        bars = tuple([adjoint.bar(names[k]) for k in kept])
+        adjoint.add(Call(graph, (*names, *(statement.outputs if rule else ()), *seeds), bars))
+        for k, bar in zip(kept, bars, strict=True):
+            adjoint.collect(names[k], bar)
+        return
+    nodes, inputs = graph.inputs, (*statement.inputs, *seeds)
+    if isinstance(statement, Sum) and any(length > 1 for length in outputs):  # seeds the same for every element
         known, size = sum(lengths[:first]), sum(lengths)
         nodes = (*nodes[:known], *nodes[size:], *nodes[known:size])
-    results, at = list(product.graph.outputs.values()), 0
-    for k in product.kept:
-        name, length = inputs[k], lengths[k]
-        graph = Graph(nodes, {f"bar{j}": node for j, node in enumerate(results[at : at + length])})
-        at += length
-        bar = adjoint.bar(name)
-        in_all = k < first or adjoint.lengths[name] != count * length  # the same number for all elements
-        adjoint.add(Sum(graph, others, (bar,), shared) if in_all else Map(graph, others, (bar,), shared))
-        adjoint.collect(name, bar)
+        shared, inputs = (*shared, *seeds), statement.inputs
+    results, at = list(graph.outputs.values()), 0
+    for k in kept:
+        one = Graph(nodes, {f"bar{j}": node for j, node in enumerate(results[at : at + lengths[k]])})
+        at += lengths[k]
+        bar = adjoint.bar(names[k])
+        in_all = k < first or adjoint.lengths[names[k]] != count * lengths[k]  # the same number for all elements
+        adjoint.add(Sum(one, inputs, (bar,), shared) if in_all else Map(one, inputs, (bar,), shared))
+        adjoint.collect(names[k], bar)

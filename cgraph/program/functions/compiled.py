@@ -1,39 +1,45 @@
-"""Compiled: the function object that `cg.compile` gives, whatever runs behind it."""
+"""`compile`: a graph as a function, by machine code or by generated Python and NumPy."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from functools import cached_property
-from typing import TypedDict
+import os
+import warnings
+from collections.abc import Callable, Sequence
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...codegen.bound_call import bound
 from ...codegen.c_entry import CEntry, c_entry
+from ...codegen.disk_cache import open_cache
+from ...codegen.llvm_engine import MissingFunctionError
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
 from ...core.graph import Graph
 from ...core.html_text import html_table, html_text
+from ...core.node import Node
+from ...util.extras import scipy_module
 from ...util.memory import lies_in_rows, require_memory, require_out, require_target
+from ...util.require import require_choice, require_flag, require_graph
 from ...util.threads import thread_count, write_batch
+from ...util.version import __version__
 from ..program import Program
 from ..runners.native_runner import NativeRunner
+from ..runners.python_runner import PythonRunner
 from ..statements.call import Call
 from .bound_function import BoundFunction
-from .differentiable import Differentiable, Ready
+from .derivative import Chosen, ColoredMatrix, Derivatives, Ready
+
+BACKENDS = ("auto", "python", "numpy", "llvm")
+LARGE_GRAPH = 1_000_000  # nodes; beyond, making machine code takes longer than most callers gain
+Inputs = str | Node | Sequence[str | Node] | None
 
 
-class Options(TypedDict):
-    """The choices of `compile`, besides the backend."""
-
-    fast: bool
-    fma: bool
-    cache: bool | str
-
-
-class Compiled(BoundFunction, Differentiable):
+class Compiled(BoundFunction):
     """A graph compiled by `cg.compile`. Inputs and outputs are in the order of the graph's.
 
     Attributes
@@ -60,15 +66,15 @@ class Compiled(BoundFunction, Differentiable):
     ([[1.0]], [[5.0], [7.0]])
     """
 
-    def __init__(self, graph: Graph, backend: str, options: Options, ready: Ready, own: Ready) -> None:
-        Differentiable.__init__(self, graph, ready)
-        self.backend, self.options = backend, options
+    def __init__(self, graph: Graph, backend: str, options: dict[str, Any], ready: Ready, own: Ready) -> None:
+        self.graph, self.backend, self.options = graph, backend, options
+        self.n_in, self.n_out = len(graph.inputs), len(graph.outputs)
         self._runner = own(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))
-        self.lanes, self.vectors, self.vector_cost = self._runner.lanes, self._runner.vectors, self._runner.vector_cost
-        self.source = self._runner._point_text("x", "y")
-        BoundFunction.__init__(self, self._bound, self.n_in, (self.n_out,), graph.input_names)
-        if (on_lists := self._runner._on_lists("x")) is not None:
-            self.values = on_lists  # type: ignore[assignment, method-assign]  # without arrays on the way
+        self.source = self._runner.text("x")
+        super().__init__(self._bound, self.n_in, (self.n_out,), graph.input_names)
+        self._derivatives = Derivatives(graph, ready, self._runner)
+        if isinstance(self._runner, PythonRunner) and (on_lists := self._runner.on_lists("x")) is not None:
+            self.values = on_lists  # type: ignore[method-assign]  # without arrays on the way
 
     def batch(self, X: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
         """Values of the outputs, (n_out, N), at N points X, (n_in, N).
@@ -90,7 +96,7 @@ class Compiled(BoundFunction, Differentiable):
         result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
         if out is not None:
             require_out(out, (self.n_out, total), points)
-        write_batch(*self._runner._columns("x"), points, result, count)
+        write_batch(*self._runner.columns("x"), points, result, count)
         return result
 
     def bind(self, x: Array, y: Array) -> Callable[[], None]:
@@ -135,12 +141,248 @@ class Compiled(BoundFunction, Differentiable):
             )
         return c_entry(self._runner.point("x", "y").entry, self.n_in, self.n_out)
 
+    def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
+        """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
+
+        An entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor
+        that is infinite or NaN it is NaN.
+
+        Parameters
+        ----------
+        x : array_like, (n_in,) or (N, n_in)
+            The point, or points, a row each.
+        X_dot : array_like, (k, n_in) or (n_in,)
+            Directions, or one. At N points (N, n_in), one for each, (N, k, n_in), or (n_in,), the same for all.
+        wrt : optional
+            The inputs to differentiate by, n_in of them, in this order; by default all.
+        threads : int, optional
+            How many may share the points, as of `batch`.
+
+        Returns
+        -------
+        ndarray, (k, n_out) or (n_out,)
+            At N points (N, k, n_out), or (N, n_out) of a direction each.
+
+        Raises
+        ------
+        GraphError
+            For another shape, or an input that is not there.
+
+        Examples
+        --------
+        >>> x, y = cg.variables("x y")
+        >>> f = cg.compile(cg.Graph([x, y], {"area": x * y}))
+        >>> f.jvp([[1.0, 2.0], [3.0, 4.0]], [1.0, 10.0]).tolist()
+        [[12.0], [34.0]]
+        """
+        return self._products(x, "X_dot", X_dot, wrt, threads, reverse=False)
+
+    def vjp(self, x: ArrayLike, Y_bar: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
+        """Products x_bar = J^T y_bar of the transposed Jacobian at x with cotangents, side by side: reverse mode.
+
+        Parameters
+        ----------
+        Y_bar : array_like, (k, n_out) or (n_out,)
+            Cotangents, or one. At N points (N, n_out), one for each, (N, k, n_out), or (n_out,), the same for all.
+        x, wrt, threads
+            As of `jvp`, and so are errors.
+
+        Returns
+        -------
+        ndarray, (k, n_in) or (n_in,)
+            At N points (N, k, n_in), or (N, n_in) of a cotangent each; n_in counts the chosen inputs.
+
+        Examples
+        --------
+        >>> x, y = cg.variables("x y")
+        >>> f = cg.compile(cg.Graph([x, y], {"area": x * y}))
+        >>> f.vjp([[1.0, 2.0], [3.0, 4.0]], [[1.0], [10.0]]).tolist()
+        [[2.0, 1.0], [40.0, 30.0]]
+        """
+        return self._products(x, "Y_bar", Y_bar, wrt, threads, reverse=True)
+
+    def jacobian(self, x: ArrayLike, *, wrt: Inputs = None, sparse: bool = False, threads: int | None = 1) -> Any:
+        """The Jacobian dy_i/dx_j at x.
+
+        Columns that share no row are one direction of a forward sweep, rows that share no column one of a reverse
+        sweep, whichever costs less, or both: `cg.sparsity` tells the entries, greedy coloring the directions.
+
+        Parameters
+        ----------
+        x : array_like, (n_in,) or (N, n_in)
+            The point, or points, a row each, which lie side by side in vectors. Of points in columns, as `batch` takes
+            them, it is `jacobian(X.T)`.
+        wrt : optional
+            The inputs to differentiate by, n_in of them, in this order; by default all. With displacements as inputs,
+            a quaternion q + G(q) xi, the columns of these at xi = 0 are those of displacements.
+        sparse : bool
+            Give a scipy.sparse.csr_array with the entries of `cg.sparsity`; of N points a list of them.
+        threads : int, optional
+            How many may share the points, as of `batch`.
+
+        Returns
+        -------
+        ndarray, (n_out, n_in) or (N, n_out, n_in)
+
+        Raises
+        ------
+        GraphError
+            For another shape, or an input that is not there.
+        ImportError
+            With `sparse` without SciPy.
+
+        Examples
+        --------
+        >>> x = cg.variable("x")
+        >>> cg.compile(cg.Graph([x], {"y": x * x})).jacobian([[1.0], [2.0], [3.0]]).ravel().tolist()
+        [2.0, 4.0, 6.0]
+        """
+        chosen = None if wrt is None else self._chosen(wrt)
+        return self._matrix(self._derivatives.jacobian(chosen), self._points(x), sparse, threads)
+
+    def hessian(
+        self,
+        x: ArrayLike,
+        y_bar: ArrayLike | None = None,
+        *,
+        wrt: Inputs = None,
+        sparse: bool = False,
+        threads: int | None = 1,
+    ) -> Any:
+        """The Hessian of y_bar . y at x: forward sweeps over the reverse one, never a tensor.
+
+        Columns are compressed by a star coloring, which reads an entry or its mirror image.
+
+        Parameters
+        ----------
+        y_bar : array_like, (n_out,) or (N, n_out), optional
+            The weights of the outputs, for all points or of each; not needed for one output.
+        x, wrt, sparse, threads
+            As of `jacobian`, and so are errors.
+
+        Returns
+        -------
+        ndarray, (n_in, n_in) or (N, n_in, n_in)
+            n_in counts the chosen inputs. With `sparse` a scipy.sparse.csr_array, or a list of them.
+
+        Examples
+        --------
+        >>> x = cg.variable("x")
+        >>> cg.compile(cg.Graph([x], {"y": x**3})).hessian([[1.0], [2.0], [3.0]]).ravel().tolist()
+        [6.0, 12.0, 18.0]
+        """
+        if y_bar is None and self.n_out != 1:
+            raise GraphError(f"hessian needs y_bar, the weights of the {self.n_out} outputs")
+        points, weights = self._points(x), real_array("y_bar", [1.0] if y_bar is None else y_bar)
+        if weights.shape != (self.n_out,) and weights.shape != (*points.shape[:-1], self.n_out):
+            each = f" or {(len(points), self.n_out)}" if points.ndim == 2 else ""
+            raise GraphError(
+                f"y_bar must have shape ({self.n_out},){each}, one weight for each output, got {weights.shape}"
+            )
+        if points.ndim > weights.ndim:
+            weights = np.broadcast_to(weights, (len(points), self.n_out))
+        matrix = self._derivatives.hessian(self._chosen(wrt))
+        return self._matrix(matrix, np.concatenate([points, weights], axis=-1), sparse, threads)
+
+    def bind_jacobian(
+        self, x: Array, values: Array, *, wrt: Inputs = None, threads: int | None = 1
+    ) -> Callable[[], None]:
+        """A function of nothing that reads x and writes the Jacobian: the fastest way to it.
+
+        As for `bind`, the arrays are checked here and kept alive, and one thread at a time may call it. What is zero
+        whatever x is set to zero here, and not touched by the function.
+
+        Parameters
+        ----------
+        x : ndarray, (n_in,) or (N, n_in)
+        values : ndarray, (n_out, n_in) or (entries,)
+            The matrix, or a number for each entry of `cg.sparsity`, row by row; of N points (N, ..).
+        wrt, threads
+            As of `jacobian`; `values` has as many columns as inputs are chosen.
+
+        Raises
+        ------
+        GraphError
+            For arrays that are not contiguous float64 of these shapes, or share memory, and for an input that is not
+            there.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> x, slopes = cg.variable("x"), np.empty((3, 1, 1))
+        >>> cg.compile(cg.Graph([x], {"y": x * x})).bind_jacobian(np.array([[1.0], [2.0], [3.0]]), slopes)()
+        >>> slopes.ravel().tolist()
+        [2.0, 4.0, 6.0]
+        """
+        matrix, count = self._derivatives.jacobian(self._chosen(wrt)), thread_count(threads)
+        rows = x.shape[:1] if isinstance(x, np.ndarray) and x.ndim == 2 else ()
+        require_memory("x", x, (*rows, self.n_in))
+        require_memory("values", values, (*rows, *matrix.entries.shape), (*rows, len(matrix.entries.rows)))
+        require_target("values", values, "x", x)
+        values[...] = 0.0
+        return bound(partial(matrix.write, x, values, count) if rows else matrix.bind(x, values))
+
     def batch_source(self) -> str:
         """The text of the function for batches: NumPy or LLVM."""
-        return self._runner._batch_text("x")
+        return self._runner.text("x", side_by_side=True)
+
+    def _points(self, x: ArrayLike) -> Array:
+        """The point, (n_in,), or points, (N, n_in), checked."""
+        points = real_array("x", x)
+        if points.shape != (self.n_in,) and (points.ndim != 2 or points.shape[1] != self.n_in):
+            wanted = f"({self.n_in},), one value for each input, or (N, {self.n_in}), a point a row"
+            raise GraphError(f"x must have shape {wanted}, got {points.shape}")
+        return points
+
+    def _chosen(self, wrt: Inputs) -> Chosen:
+        """The numbers of the inputs that `wrt` names."""
+        if wrt is None:
+            return None
+        places = {node: k for k, node in enumerate(self.graph.inputs)}
+        chosen = tuple([places[node] for node in self.graph.select_inputs(wrt)])
+        return None if chosen == tuple(range(self.n_in)) else chosen
+
+    def _products(
+        self, x: ArrayLike, name: str, directions: ArrayLike, wrt: Inputs, threads: int | None, *, reverse: bool
+    ) -> Array:
+        points, rows, chosen = self._points(x), real_array(name, directions), self._chosen(wrt)
+        width, found = self.n_in if chosen is None else len(chosen), self.n_out
+        if reverse:
+            width, found = found, width
+        count, one, total = thread_count(threads), points.ndim == 1, len(points)
+        if not one and rows.ndim == 1:
+            rows = np.broadcast_to(rows, (total, *rows.shape))
+        if rows.ndim - points.ndim not in (0, 1) or rows.shape[-1] != width or not (one or len(rows) == total):
+            each = f"({total}, {width}), ({total}, k, {width}) or ({width},) for {total} points"
+            raise GraphError(
+                f"{name} must have shape {f'(k, {width}) or ({width},)' if one else each}, got {rows.shape}"
+            )
+        result = np.zeros((*rows.shape[:-1], found))
+        if self.n_in and result.size:
+            products = self._derivatives.products(chosen, reverse)
+            if not one:
+                products.many(points, rows.reshape(total, -1, width), result.reshape(total, -1, found), count)
+            elif rows.ndim == 2:
+                products.at(points, rows, result)
+            else:
+                products.at(points, rows[None], result[None])
+        return result
+
+    def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
+        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
+        if not require_flag("sparse", sparse):
+            return matrix.at(points, True, count)
+        module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
+        rows = matrix.at(points, False, count)
+        shape, listed = matrix.entries.shape, rows if rows.ndim == 2 else [rows]
+        found = [module.csr_array((row, columns.copy(), starts.copy()), shape=shape) for row in listed]
+        return found if rows.ndim == 2 else found[0]
 
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
-        return self._runner._bind_pass(("x", x), ("y", y))[0]
+        return self._runner.bind_pass(("x", x), ("y", y))[0]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _remade, (_Version(), self.graph, self.backend, self.options)  # which make the machine code again
 
     def _repr_html_(self) -> str:
         rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]
@@ -149,3 +391,119 @@ class Compiled(BoundFunction, Differentiable):
 
     def __repr__(self) -> str:
         return f"<compiled {self.graph!r}, backend {self.backend!r}>"
+
+
+def compile(
+    graph: Graph,
+    backend: str = "auto",
+    *,
+    fast: bool = False,
+    fma: bool = True,
+    cache: bool | str | os.PathLike[str] = False,
+) -> Compiled:
+    """The graph as a function: `fn(x)` at one point, `fn.batch(X)` at many, `fn.source` to read.
+
+    All back ends agree with `graph.evaluate`, on floats and on arrays respectively. `fast` and `cache` are for machine
+    code alone.
+
+    Parameters
+    ----------
+    graph : Graph
+        What to compile.
+    backend : {"auto", "llvm", "python", "numpy"}
+        "llvm": machine code (extra `native`). "python": generated Python over floats. "numpy": generated NumPy over
+        arrays. "auto": machine code where llvmlite is installed, the C library has all functions of the graph and that
+        has at most 1 000 000 nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`; a
+        RuntimeWarning says so if it is the size. Beyond 60 000 nodes machine code is made in two thirds of the time
+        for a node, and takes twice as long to run.
+    fast : bool
+        May also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero; NaN and
+        infinities keep their meaning.
+    fma : bool
+        May round a product and the sum it goes into once instead of twice, and take sines, cosines, exponentials and
+        logarithms from polynomials (within 2 ulp), NumPy its own functions. Without, `fn(x)` and `fn.batch(X)` agree
+        with `graph.evaluate` at a point to the last bit, in every back end; batches then call the C library for each
+        column.
+    cache : bool or path
+        Keep machine code on disk for the next process, and read it from there: True, in the platform's folder for
+        caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder, `~` the home, that nobody
+        else can write to. An entry is identified by the code's text, the processor and the version of LLVM; a damaged
+        one is made anew. A folder that cannot be written gives a RuntimeWarning. `clear_cache` empties it; nothing
+        else does.
+
+    Returns
+    -------
+    Compiled
+        The function; inputs and outputs are in the order of the graph's.
+
+    Raises
+    ------
+    TypeError
+        For what is no Graph, `fast` or `fma` that are neither True nor False, or a cache that is no path either.
+    ValueError
+        For an unknown backend.
+    ImportError
+        For "llvm" without llvmlite.
+    RuntimeError
+        For "llvm" where an operation is no function of the C library and its row has no instructions.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> f = cg.compile(cg.Graph([x, y], {"area": x * y}))
+    >>> f([2.0, 3.0]).tolist(), f.batch([[1.0, 2.0], [3.0, 4.0]]).tolist()
+    ([6.0], [[3.0, 8.0]])
+    """
+    require_choice("backend", backend, BACKENDS)
+    require_graph("compile", graph)
+    options: dict[str, Any] = {
+        "fast": require_flag("fast", fast),
+        "fma": require_flag("fma", fma),
+        "cache": _place(cache),
+    }
+    large = backend == "auto" and len(graph.nodes) > LARGE_GRAPH
+    if large:
+        warnings.warn(
+            f"a graph of {len(graph.nodes)} nodes is compiled to generated Python, as it has more than {LARGE_GRAPH}; "
+            "backend='llvm' makes machine code of it",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    if backend == "llvm" or (backend == "auto" and not large):
+        try:
+            kept = open_cache(options["cache"])
+            ready = partial(NativeRunner, fast=options["fast"], fma=options["fma"], cache=kept)
+            return Compiled(graph, backend, options, ready, ready)
+        except (ImportError, MissingFunctionError):
+            if backend == "llvm":
+                raise
+    in_python = partial(PythonRunner, fma=options["fma"])
+    return Compiled(graph, backend, options, in_python, partial(in_python, backend=backend))
+
+
+def _place(cache: bool | str | os.PathLike[str]) -> bool | str:
+    """The choice of a cache in words that hold in another folder and another process."""
+    if isinstance(cache, (bool, np.bool_)):
+        return bool(cache)
+    if not isinstance(cache, (str, os.PathLike)) or not os.fspath(cache):
+        raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r:.60}")
+    return str(Path(cache).expanduser().absolute())
+
+
+class _Version:
+    """The version that writes a pickle; in it, the first that is read."""
+
+    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
+        return require_version, (__version__,)
+
+
+def require_version(version: str) -> None:
+    """Raise ValueError unless a pickle was written by this version."""
+    if version != __version__:
+        problem = f"was pickled by cgraph {version}, and this is cgraph {__version__}"
+        raise ValueError(f"a compiled graph {problem}: pickle the graph alone, or compile it again")
+
+
+def _remade(_: object, graph: Graph, backend: str, options: dict[str, Any]) -> Compiled:
+    return compile(graph, backend, **options)

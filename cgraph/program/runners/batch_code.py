@@ -18,14 +18,13 @@ from ...codegen.llvm_engine import Code
 from ...core.evaluation import Array
 from ...util.memory import aligned, lies_in_rows
 from ..fuse import fused
-from ..many import many_keeping
+from ..many import many, many_keeping
 from ..program import Program, whole_graph
-from .llvm_ir import offsets, program_ir
+from .llvm_ir import ONE_RUN, offsets, program_ir
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
-
-_BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
 _LANES = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 6, *[ctypes.c_int64] * 3)
+_BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
 
 
 class BatchCode:
@@ -80,18 +79,23 @@ class BatchCode:
         self._free.append(memory)
 
 
+def beside(program: Program) -> Program:
+    """The program of memories side by side, see `many`."""
+    return many(program)
+
+
 def kept_beside(program: Program, kept: Sequence[str], alike: bool) -> Program:
-    """The program of memories side by side that puts back the registers `kept` where a memory rests."""
+    """The same, fused, which puts back the registers `kept` where a memory rests."""
     return fused(many_keeping(program, kept), alike=alike)
 
 
 def pass_ir(
-    program: Program, beside: Callable[[], Program], name: str, lanes: int, flags: str, registers: int
+    program: Program, masked: Callable[[], Program], name: str, lanes: int, flags: str, registers: int
 ) -> Batch:
-    """The text of one pass at many values of a register.  beside: gives the program of memories side by side."""
+    """The text of one pass at many values of a register.  masked: gives the program of memories side by side."""
     if (graph := whole_graph(program, name)) is not None:
         return batch_ir(graph, lanes, flags, registers)
-    return program_rows_ir(beside(), name, lanes, flags, registers)
+    return program_rows_ir(masked(), name, lanes, flags, registers)
 
 
 def program_rows_ir(program: Program, name: str, lanes: int, flags: str, registers: int) -> Batch:
@@ -103,14 +107,11 @@ def program_rows_ir(program: Program, name: str, lanes: int, flags: str, registe
     point, *results = [Place(places[each], program.registers[each]) for each in (name, *program.record)]
 
     def compute(ir: FunctionWriter, *_: str) -> None:
-        ir.line(_ONE_RUN.format(done=ir.room(1, "i64")))
+        ir.line(ONE_RUN.format(done=ir.room(1, "i64")))
 
     source = program_ir(replace(program, record=()), arithmetic, 1)
     driver = rows_ir(Arithmetic(flags, lanes), point, results, compute)
     return Batch("\n".join([source, *driver, ""]), lanes * places[""])
-
-
-_ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0)"
 
 
 class LaneCode:
@@ -118,16 +119,6 @@ class LaneCode:
 
     numbers: {register: place in the row of a memory}, of those registers that outlive a pass.  size: of such a row.
     Any number of threads may call it at once, on rows of their own.
-
-    Of x = x / 2, while x > 1:
-
-    >>> import cgraph as cg
-    >>> from cgraph.extend import Call, Program, runner
-    >>> x = cg.variable("x")
-    >>> halve = Call(cg.Graph([x], {"x": 0.5 * x, "done": 0.5 * x <= 1.0}), ("x",), ("x", "done"))
-    >>> code = runner(Program({"x": 1, "done": 1}, [halve], ["x"], stop="done")).lane_code("x")
-    >>> sorted(code.numbers)
-    ['x']
     """
 
     def __init__(self, code: Code, program: Program, kept: Sequence[str], lanes: int, size: int) -> None:
@@ -185,7 +176,7 @@ class _LaneWriter(FunctionWriter):
                 self._give_back(lane)
                 self._take(lane)
             self.leave_unless(self.integer("icmp sgt", self.load_at(self._live, "i64"), 0), end)
-            self.line(_ONE_RUN.format(done=done))
+            self.line(ONE_RUN.format(done=done))
             self._record_lanes()
             left = self.value(f"sub {self._integers} {self.load_at(self._left, self._integers)}, splat (i64 1)")
             self.store_at(left, self._left, self._integers)

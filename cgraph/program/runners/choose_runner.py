@@ -6,7 +6,7 @@ from ...codegen.llvm_engine import MissingFunctionError
 from ...util.explain_failure import explain_failure
 from ...util.require import require_choice, require_flag
 from ..program import Program
-from .native_runner import NativeRunner, flags_of
+from .native_runner import NativeRunner
 from .runner import Runner
 
 BACKENDS = ("auto", "python", "llvm")
@@ -32,7 +32,7 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
     fast, fma = require_flag("fast", fast), require_flag("fma", fma)
     if backend != "python":
         try:
-            return NativeRunner(program, flags_of(fast, fma))
+            return NativeRunner(program, fast=fast, fma=fma)
         except (ImportError, MissingFunctionError):
             if backend == "llvm":
                 raise

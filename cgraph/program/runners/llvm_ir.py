@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from ...codegen.arithmetic import REGISTERS, Arithmetic
 from ...codegen.function_writer import copied_bytes
 from ...codegen.llvm_engine import MissingFunctionError
 from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
-from ..llvm_functions import Functions
 from ..program import Program, whole_graph
 from ..statement import row_of
-from ..statements.call import Call
-from ..writer import Writer
+from ..writer import Functions, Writer
 
 
 def program_functions(program: Program) -> dict[str, int]:
@@ -87,6 +84,7 @@ def point_ir(
 
 _ARGUMENTS = "ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done, ptr noalias %feed, "
 _ARGUMENTS += "i64 %stride"
+ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0)"  # a pass without a record
 
 
 def _run_function(program: Program, ir: Writer) -> list[str]:
@@ -96,10 +94,8 @@ def _run_function(program: Program, ir: Writer) -> list[str]:
         read; statements; done++; if (--until == 0) { until = every; record } if (stop) break
     }
     """
-    ir.offsets = places = offsets(program.registers, ir.functions.width)
+    places = offsets(program.registers, ir.functions.width)
     ir.pointers = {name: ir.at("%memory", places[name]) for name in program.registers}
-    calls = Counter([id(each.graph) for each in program.statements() if isinstance(each, Call)])
-    ir.alone = frozenset([graph for graph, count in calls.items() if count == 1])
     row, until = ir.room(1, "ptr"), ir.room(1, "i64")
     ir.store_at("%records", row, "ptr")
     ir.store_at("%every", until, "i64")

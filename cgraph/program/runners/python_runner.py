@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...codegen.python_function import OnArrays, OnFloats
 from ...core.evaluation import Array
 from ...core.graph import Graph
+from ..many import many
 from ..program import Program, whole_graph
 from ..statement import Execution
 from ..statements.call import spread
-from .runner import Record, Runner
+from .runner import Record, Runner, Start
+
+if TYPE_CHECKING:
+    from .batch_code import LaneCode
 
 BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
+STATES = 512  # states of a batch that are run between looks at the keyboard
 
 
 class PythonRunner(Runner):
@@ -34,6 +39,11 @@ class PythonRunner(Runner):
         self._fma, self._backend = fma, backend
         self._functions: dict[int, OnFloats] = {}
         self._arrays: dict[int, OnArrays] = {}
+
+    @cached_property
+    def masked(self) -> Program:
+        """The program of memories side by side, see `many`."""
+        return many(self.program)
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         program = self.program
@@ -53,8 +63,7 @@ class PythonRunner(Runner):
         return Record(np.array(rows).reshape(len(rows), program.width), done)
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
-        program, count = self.program, memories.shape[1]
-        masked = self.masked
+        program, count, masked = self.program, memories.shape[1], self.masked
         execution = Execution(masked.registers, self._at, self._batch, count)
         state = {name: np.zeros((length, count)) for name, length in masked.registers.items()}
         state |= {name: memories[place].copy() for name, place in self._slices.items()}
@@ -68,23 +77,34 @@ class PythonRunner(Runner):
             memories[place] = state[name]
         return Record(rows, passes)
 
-    def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+    def _bind(self, memory: Array, rows: Array | None) -> Callable[..., None]:
+        def write(into: Array) -> None:
+            found = self._run(memory, len(into), 1, np.empty((len(into), 0))).rows
+            into[: len(found)] = found
+
+        def advance(passes: int) -> None:
+            self._run(memory, passes, passes + 1, np.empty((passes, 0)))
+
+        return advance if rows is None else lambda: write(rows)
+
+    def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+        """Registers are lists in between."""
         arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
-        flat = arrays[y[0]] = y[1].reshape(-1)
+        flat, point = y[1].reshape(-1), x[1]
         if (graph := whole_graph(self.program, x[0])) is not None:
-            on_lists, point = self._on_lists(x[0]), x[1]
+            if self._backend == "numpy":
+                columns = self._on_arrays(graph), point[:, None], flat[:, None]
+                return lambda: columns[0](*columns[1:]), arrays
+            function = self._on_floats(graph)
 
             def call() -> None:
-                if on_lists is not None:
-                    flat[:] = on_lists(point.tolist())
-                else:
-                    self._on_arrays(graph)(point[:, None], flat[:, None])
+                flat[:] = function(point.tolist())
 
             return call, arrays
-        execution = Execution(self.program.registers, self._at, self._batch)
+        arrays[y[0]], execution = flat, Execution(self.program.registers, self._at, self._batch)
 
         def run() -> None:
-            state: dict[str, Any] = {**arrays, x[0]: x[1].tolist()}
+            state: dict[str, Any] = {**arrays, x[0]: point.tolist()}
             execution.run(self.program.body, state)
             for name, array in arrays.items():
                 if state[name] is not array:
@@ -92,14 +112,20 @@ class PythonRunner(Runner):
 
         return run, arrays
 
-    def _columns(
-        self, name: str, start: Mapping[str, Array] = MappingProxyType({})
-    ) -> tuple[int, Callable[[Array, Array], None]]:
+    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
+        """Of one graph its function of arrays; "python" alone goes point by point."""
         if (graph := whole_graph(self.program, name)) is None:
-            return super()._columns(name, start)
+            begin = start()
+
+            def write(values: Array, records: Array) -> None:
+                count = values.shape[1]
+                others = {each: np.repeat(numbers[:, None], count, axis=1) for each, numbers in begin.items()}
+                memories = self.memory({name: values, **others}, count)
+                records[...] = self._run_many(memories, 1, 1, np.empty((1, 0, count))).rows[0]
+
+            return STATES, write
         if self._backend != "python":
             return BLOCK, self._on_arrays(graph)
-
         function = self._on_floats(graph)
 
         def one_by_one(points: Array, result: Array) -> None:
@@ -108,24 +134,20 @@ class PythonRunner(Runner):
 
         return sys.maxsize, one_by_one  # the interpreter runs one thread at a time
 
-    def _point_text(self, x: str, y: str) -> str:
-        """The text in Python, of one graph."""
-        if self._backend == "numpy":
-            return self._batch_text(x)
-        return self._on_floats(self._graph(x)).source
+    def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
+        """None: it is machine code."""
+        return None
 
-    def _batch_text(self, name: str) -> str:
-        """The text in NumPy, of one graph."""
-        return self._on_arrays(self._graph(name)).source
+    def text(self, x: str, *, side_by_side: bool = False) -> str:
+        """The text of one graph in Python, or in NumPy; of other programs their listing."""
+        if (graph := whole_graph(self.program, x)) is None:
+            return self.program.listing()
+        return (self._on_arrays if side_by_side or self._backend == "numpy" else self._on_floats)(graph).source
 
-    def _on_lists(self, name: str) -> OnFloats | None:
+    def on_lists(self, x: str) -> OnFloats | None:
         """The function of lists, of one graph."""
-        return None if self._backend == "numpy" else self._on_floats(self._graph(name))
-
-    def _graph(self, name: str) -> Graph:
-        graph = whole_graph(self.program, name)
-        assert graph is not None
-        return graph
+        graph = whole_graph(self.program, x)
+        return None if self._backend == "numpy" or graph is None else self._on_floats(graph)
 
     def _on_floats(self, graph: Graph) -> OnFloats:
         if id(graph) not in self._functions:

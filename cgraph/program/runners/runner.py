@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from types import MappingProxyType
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -22,7 +21,7 @@ from .llvm_ir import offsets
 if TYPE_CHECKING:
     from .batch_code import LaneCode
 
-BLOCK = 512  # states of a batch in Python that are run between looks at the keyboard
+Start = Callable[[], Mapping[str, Array]]  # gives initial values of registers
 
 
 class Record(NamedTuple):
@@ -44,17 +43,8 @@ class Record(NamedTuple):
     passes: int
 
 
-@contextmanager
-def _fitting(rows: int, width: int) -> Iterator[None]:
-    """Tell in a sentence where memory does not suffice for the rows of a record."""
-    try:
-        yield
-    except MemoryError:
-        raise MemoryError(f"{rows} rows of {width} numbers do not fit in memory: record fewer passes (every)") from None
-
-
 class Runner(ABC):
-    """A program ready to run; made by `runner`.
+    """A program ready to run; made by `runner`. It can `run` on a memory of all registers, `bind` one, and tell `text`.
 
     width: numbers in a vector of `Map`, to a multiple of which registers are padded.  size: numbers in a memory.
 
@@ -74,20 +64,11 @@ class Runner(ABC):
         places = offsets(program.registers, width)
         self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
         self.size = places[""]
-        self._masked: Program | None = None
 
     @property
+    @abstractmethod
     def masked(self) -> Program:
-        """The program of memories side by side, see `many`; made at its first use."""
-        if self._masked is None:
-            from ..many import many  # a program of one memory does without
-
-            self._masked = many(self.program)
-        return self._masked
-
-    def prepared(self) -> Runner:
-        """This runner, with all made that `run` needs, so that its first run takes no longer than the next."""
-        return self
+        """The program of memories side by side, see `many`."""
 
     def memory(self, values: Mapping[str, ArrayLike], count: int | None = None) -> Array:
         """A memory, (size,) or (size, count), with these values of registers, 0 elsewhere.
@@ -120,95 +101,57 @@ class Runner(ABC):
     def run(self, memory: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
         """Run passes, fewer if the program stops, and record a row after each `every`th.
 
-        memory: float64 (size,), changed in place: the next run continues from it.  feed: (passes, feed_width), of a
-        program with a feed, what its registers are before each pass.
-        Raises GraphError for a memory or a feed of another shape or type, or a number out of range.
+        memory: float64 (size,), changed in place: the next run continues from it. Or N memories (size, N), which run
+        side by side in vectors, as each does alone, whichever course it takes; the last axis counts them, as in
+        `Compiled.batch`, and rows of the record are (rows, width, N).
+        feed: (passes, feed_width), of a program with a feed, what its registers are before each pass; of N memories
+        (passes, feed_width, N), or (passes, feed_width, 1) for all.
+        Raises GraphError for a memory or a feed of another shape or type, or a number out of range; for N memories of a
+        program with `record_if` or `stop`, by which they would have other numbers of rows or passes, or with statements
+        that run one memory alone.
         """
-        self._check(memory, (self.size,), passes, every)
-        fed = self._fed(feed, (passes, self.program.feed_width))
-        with _fitting(passes // every, self.program.width):
-            return self._run(memory, passes, every, fed)
+        many = memory.shape[1:] if isinstance(memory, np.ndarray) and memory.ndim == 2 else ()
+        self._check(memory, (self.size, *many), passes, every)
+        if many:
+            self._require_beside()
+        shape = (passes, self.program.feed_width, *many)
+        fed = np.empty(shape) if feed is None and not self.program.feed else self._fed(feed, shape)
+        try:
+            return (self._run_many if many else self._run)(memory, passes, every, fed)
+        except MemoryError:
+            rows = f"{passes // every} rows of {self.program.width * math.prod(many)} numbers"
+            raise MemoryError(f"{rows} do not fit in memory: record fewer passes (every)") from None
 
-    def bind(self, memory: Array, rows: Array) -> Callable[[], None]:
+    def bind(self, memory: Array, rows: Array | None = None) -> Callable[..., None]:
         """A function of nothing: `run` on this memory, len(rows) passes, which writes the rows.
 
-        The arrays, float64 (size,) and (passes, width), are checked here and never again; the function keeps them
-        alive. Registers may be written between calls, such as through `read`. A pass that records nothing leaves the
-        last rows as they were. One thread at a time may call it.
+        Without rows a function of a number of passes, which records nothing. The arrays, float64 (size,) and
+        (passes, width), are checked here and never again; the function keeps them alive. Registers may be written
+        between calls, such as through `read`. A pass that records nothing leaves the last rows as they were. One thread
+        at a time may call it.
         Raises GraphError for an array of another shape or type, or a program with a feed.
         """
         if self.program.feed:
             raise GraphError("a bound run takes no feed: give its registers a place in the memory")
-        passes = len(rows) if isinstance(rows, np.ndarray) and rows.ndim else 0
-        require_memory("rows", rows, (passes, self.program.width))
-        self._check(memory, (self.size,), passes, 1)
-        return self._bound(memory, rows)
-
-    def _bound(self, memory: Array, rows: Array) -> Callable[[], None]:
-        def call() -> None:
-            found = self.run(memory, len(rows)).rows
-            rows[: len(found)] = found
-
-        return call
-
-    def advancing(self, memory: Array) -> Callable[[int], None]:
-        """A function of a number of passes: `run` on this memory, without a record.
-
-        The memory, float64 (size,), is checked here and never again. Registers may be written between calls, such as
-        through `read`. One thread at a time may call it.
-        Raises GraphError for a memory of another shape or type, or a program with a feed.
-        """
-        if self.program.feed:
-            raise GraphError("a bound run takes no feed: give its registers a place in the memory")
+        if rows is not None:
+            passes = len(rows) if isinstance(rows, np.ndarray) and rows.ndim else 0
+            require_memory("rows", rows, (passes, self.program.width))
         self._check(memory, (self.size,), 0, 1)
-        return self._advancing(memory)
+        return self._bind(memory, rows)
 
-    def _advancing(self, memory: Array) -> Callable[[int], None]:
-        def advance(passes: int) -> None:
-            self._run(memory, passes, passes + 1, np.empty((passes, 0)))
-
-        return advance
+    run_many, advancing = run, bind  # of N memories, and without rows
 
     @abstractmethod
-    def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
-        """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
-
-        The arrays, contiguous and of as many numbers, are not checked; a `Map` that writes y has elements in whole
-        vectors. With it come the other registers, zeros.
-        """
-
-    def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
-        """Run N memories (size, N) at once, in vectors: as `run` does each, whichever course it takes.
-
-        feed: (passes, feed_width, N), or (passes, feed_width, 1) for all.  The record has rows (rows, width, N).
-        The last axis counts the memories, as in `Compiled.batch`: each number of all of them is a row, read as vectors.
-        Raises GraphError, besides as `run`, for a program with `record_if` or `stop`, by which memories would have
-        other numbers of rows or passes, or with statements that run one memory alone.
-        """
-        if not isinstance(memories, np.ndarray) or memories.ndim != 2:
-            raise GraphError(f"memories must have shape ({self.size}, N), got {describe(memories)}")
-        self._check(memories, (self.size, memories.shape[1]), passes, every)
-        self._require_beside()
-        count = memories.shape[1]
-        fed = self._fed(feed, (passes, self.program.feed_width, count))
-        with _fitting(passes // every, self.program.width * count):
-            return self._run_many(memories, passes, every, fed)
-
-    def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
-        """Machine code of memories in lanes, see `LaneCode`; none in Python, with a feed, or of what runs alone.
-
-        clock: a register of length 1.  results: registers that are read after a run.  alike: whether a memory has the
-        bits that it has alone; else sines and such are those of vectors, as in `run_many`.
-        """
-        return None
+    def text(self, x: str, *, side_by_side: bool = False) -> str:
+        """What one pass from this register to the record is run as; with `side_by_side` at many values of it."""
 
     def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
         """Record of one pass, (N, width), at each of N values of a register, (N, length), side by side in vectors.
 
         threads: how many may share the work; None: one for each core.  out: where the rows go, sharing no memory with
         `values`; a new array by default.
-        Raises GraphError for another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records
-        a register, other than this one, that it may not have set before.
+        Raises GraphError for another shape; if the program cannot `run` N memories, or has a feed; if a pass reads or
+        records a register, other than this one, that it may not have set before.
         """
         count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
         length = len(self.read(np.empty(self.size), name))
@@ -222,24 +165,31 @@ class Runner(ABC):
         shape = len(rows), self.program.width
         result = np.empty(shape) if out is None else out
         require_out(result, shape, rows)
-        write_batch(*self._columns(name), rows.T, result.T, count)
+        write_batch(*self.columns(name), rows.T, result.T, count)
         return result
 
-    def _columns(
-        self, name: str, start: Mapping[str, Array] = MappingProxyType({})
-    ) -> tuple[int, Callable[[Array, Array], None]]:
-        """The k worth a thread's start, and a writer of records, (width, k), of values of a register, (length, k).
+    @abstractmethod
+    def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
+        """Machine code of memories in lanes, see `LaneCode`; none in Python, with a feed, or of what runs alone.
 
-        start: what other registers hold before; those that are not there, zeros, unless a pass left others.
+        clock: a register of length 1.  results: registers that are read after a run.  alike: whether a memory has the
+        bits that it has alone; else sines and such are those of vectors, as of `run` with N memories.
         """
 
-        def write(values: Array, records: Array) -> None:
-            memories = self.memory({name: values}, values.shape[1])
-            for other, numbers in start.items():
-                self.write(memories, other, np.broadcast_to(numbers[:, None], (len(numbers), values.shape[1])))
-            records[...] = self._run_many(memories, 1, 1, np.empty((1, 0, values.shape[1]))).rows[0]
+    @abstractmethod
+    def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+        """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
 
-        return BLOCK, write
+        The arrays, contiguous and of as many numbers, are not checked; a `Map` that writes y has elements in whole
+        vectors. With it come the other registers, zeros.
+        """
+
+    @abstractmethod
+    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
+        """The k worth a thread's start, and a writer of records, (width, k), of values of a register, (length, k).
+
+        start: gives initial values of other registers (default 0).
+        """
 
     def _require_beside(self) -> None:
         if alone := self.program.alone:
@@ -247,8 +197,6 @@ class Runner(ABC):
 
     def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
         """The rows of a feed, of that shape; the last dimension may be one for all."""
-        if feed is None and not self.program.feed:
-            return np.empty(shape)
         rows = real_array("feed", () if feed is None else feed)
         if rows.shape not in (shape, (*shape[:2], 1)[: len(shape)]):
             raise GraphError(f"the program needs a feed of shape {shape}, got {rows.shape}")
@@ -261,20 +209,11 @@ class Runner(ABC):
         require_whole("passes", passes)
         require_whole("every", every, 1)
 
-    def _on_lists(self, name: str) -> Callable[[list[float]], tuple[float, ...]] | None:
-        """The record of one pass, at a list of floats for a register, where that needs no memory."""
-        return None
-
-    @abstractmethod
-    def _point_text(self, x: str, y: str) -> str:
-        """The text of one pass of which two registers lie apart."""
-
-    @abstractmethod
-    def _batch_text(self, name: str) -> str:
-        """The text of the function for batches of a register."""
-
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...
 
     @abstractmethod
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record: ...
+
+    @abstractmethod
+    def _bind(self, memory: Array, rows: Array | None) -> Callable[..., None]: ...

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,91 +62,66 @@ def check_matrix(statement: Factor | Solve, lengths: Lengths) -> None:
 
 
 def run_factor(statement: Factor, state: dict[str, Any], execution: Execution) -> None:
-    """Run in Python, of one memory or of many."""
-    a, n = np.array(state[statement.matrix]), len(state[statement.pivots])
-    pivots = np.empty((n, *a.shape[1:]))
-    _factor(a.reshape(n, n, *a.shape[1:]), pivots)
-    execution.write(state, statement.matrix, a)
-    execution.write(state, statement.pivots, pivots)
-
-
-def run_solve(statement: Solve, state: dict[str, Any], execution: Execution) -> None:
-    """Run in Python, of one memory or of many."""
-    a, pivots, b = [np.array(state[name]) for name in (statement.matrix, statement.pivots, statement.vector)]
-    _solver(statement)(a.reshape(len(b), *b.shape), pivots, b)
-    execution.write(state, statement.vector, b)
-
-
-def _solver(statement: Solve) -> Callable[[Array, Array, Array], None]:
-    return _solve_transposed if statement.transposed else _solve
-
-
-def factor_text(statement: Factor, writer: Writer) -> None:
-    """Write as machine code."""
-    n = writer.registers[statement.pivots]
-    name = writer.functions.text("lu.factor", _lu_factor_text)
-    writer.call(name, [writer.pointer(each) for each in (statement.matrix, statement.pivots)], n)
-
-
-def solve_text(statement: Solve, writer: Writer) -> None:
-    """Write as machine code."""
-    n = writer.registers[statement.pivots]
-    name, text = "lu.solve", _lu_solve_text
-    if statement.transposed:
-        name, text = "lu.solve.transposed", _lu_solve_transposed_text
-    registers = statement.matrix, statement.pivots, statement.vector
-    writer.call(writer.functions.text(name, text), [writer.pointer(each) for each in registers], n)
-
-
-def _factor(a: Array, pivots: Array) -> None:
-    """LU = PA in place of a (n, n), L with a unit diagonal; pivots (n,) receives the row exchanged with row k."""
-    n = len(a)
+    """Run in Python, of one memory or of many: L has a unit diagonal."""
+    flat, n = np.array(state[statement.matrix]), len(state[statement.pivots])
+    a, pivots = flat.reshape(n, n, *flat.shape[1:]), np.empty((n, *flat.shape[1:]))
     with np.errstate(all="ignore"):
         for k in range(n):
             pivots[k] = _largest(a, k)
             _exchange(a, k, pivots)
             a[k + 1 :, k] /= a[k, k]  # column k of L; then the Schur complement
             a[k + 1 :, k + 1 :] -= a[k + 1 :, k, None] * a[k, k + 1 :]
+    execution.write(state, statement.matrix, flat)
+    execution.write(state, statement.pivots, pivots)
 
 
-def _solve(a: Array, pivots: Array, b: Array) -> None:
-    """The solution of A x = b in place of b (n,)."""
-    n = len(a)
+def run_solve(statement: Solve, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python, of one memory or of many: A = P^T L U, or A^T = U^T L^T P."""
+    a, pivots, b = [np.array(state[name]) for name in (statement.matrix, statement.pivots, statement.vector)]
+    a, n = a.reshape(len(b), *b.shape), len(b)
     with np.errstate(all="ignore"):
-        for k in range(n):  # b = P b
+        for k in range(n) if not statement.transposed else ():
             _exchange(b, k, pivots)
-        for k in range(n):  # L y = b
-            b[k + 1 :] -= a[k + 1 :, k] * b[k]
-        for k in reversed(range(n)):  # U x = y
-            b[k] /= a[k, k]
-            b[:k] -= a[:k, k] * b[k]
+        for forward in (True, False):
+            for k in range(n) if forward else reversed(range(n)):
+                rest = slice(k + 1, n) if forward else slice(k)
+                if forward == statement.transposed:  # by U, whose diagonal is not 1
+                    b[k] /= a[k, k]
+                b[rest] -= (a[k, rest] if statement.transposed else a[rest, k]) * b[k]
+        for k in reversed(range(n)) if statement.transposed else ():
+            _exchange(b, k, pivots)
+    execution.write(state, statement.vector, b)
 
 
-def _solve_transposed(a: Array, pivots: Array, b: Array) -> None:
-    """The solution of A^T x = b in place of b (n,): A^T = U^T L^T P."""
-    n = len(a)
-    with np.errstate(all="ignore"):
-        for k in range(n):  # U^T y = b
-            b[k] /= a[k, k]
-            b[k + 1 :] -= a[k, k + 1 :] * b[k]
-        for k in reversed(range(n)):  # L^T z = y
-            b[:k] -= a[k, :k] * b[k]
-        for k in reversed(range(n)):  # x = P^T z
-            _exchange(b, k, pivots)
+def factor_text(statement: Factor, writer: Writer) -> None:
+    """Write as machine code."""
+    _call(writer, "lu.factor", _lu_factor_text, statement, statement.matrix, statement.pivots)
+
+
+def solve_text(statement: Solve, writer: Writer) -> None:
+    """Write as machine code."""
+    name = "lu.solve.transposed" if statement.transposed else "lu.solve"
+    text = partial(_lu_solve_text, name=name, transposed=statement.transposed)
+    _call(writer, name, text, statement, statement.matrix, statement.pivots, statement.vector)
+
+
+def _call(
+    writer: Writer, name: str, text: Callable[[Arithmetic], list[str]], statement: Factor | Solve, *registers: str
+) -> None:
+    pointers = [writer.pointer(register) for register in registers]
+    writer.call(writer.functions.text(name, text), pointers, writer.registers[statement.pivots])
 
 
 def _largest(a: Array, k: int) -> Any:
     """argmax over i >= k of |a[i, k]|, in every lane: not NumPy's, since a NaN must not win, as in machine code."""
     row: Any = k
-    if a.ndim == 2:
-        for i in range(k + 1, len(a)):
-            if abs(a[i, k]) > abs(a[row, k]):
-                row = i
-        return row
-    best = np.abs(a[k, k])
+    best = abs(a[k, k])
     for i in range(k + 1, len(a)):
-        size = np.abs(a[i, k])
-        row, best = np.where(size > best, i, row), np.where(size > best, size, best)
+        size = abs(a[i, k])
+        if a.ndim > 2:
+            row, best = np.where(size > best, i, row), np.where(size > best, size, best)
+        elif size > best:
+            row, best = i, size
     return row
 
 
@@ -209,7 +185,7 @@ class _MatrixWriter(FunctionWriter):
 
 
 def _lu_factor_text(arithmetic: Arithmetic) -> list[str]:
-    """`void lu.factor(double *a, double *p, int64_t n)`, as `factor`."""
+    """`void lu.factor(double *a, double *p, int64_t n)`, as `run_factor`."""
     ir = _MatrixWriter(arithmetic)
     best, chosen = ir.room(), ir.room()
 
@@ -243,43 +219,23 @@ def _lu_factor_text(arithmetic: Arithmetic) -> list[str]:
     return ir.function("internal void @lu.factor(ptr %a, ptr %p, i64 %n) nounwind")
 
 
-def _lu_solve_text(arithmetic: Arithmetic) -> list[str]:
-    """`void lu.solve(double *a, double *p, double *b, int64_t n)`, as `solve`."""
+def _lu_solve_text(arithmetic: Arithmetic, name: str, transposed: bool) -> list[str]:
+    """`void lu.solve(double *a, double *p, double *b, int64_t n)`, as `run_solve`."""
     ir = _MatrixWriter(arithmetic)
-    # b = P b
-    with ir.loop(0, "%n") as k, ir.each_lane() as lane:
-        ir.exchange("%b", k, ir.pivot(k, lane), lane)
-    # L y = b:  b[i] -= a[i, k] b[k] for i > k, k = 0 .. n - 1
-    with ir.loop(0, "%n") as k:
-        value = ir.load_at(ir.at("%b", k))
-        with ir.loop(ir.integer("add", k, 1), "%n") as i:
-            ir.subtract_product(ir.at("%b", i), ir.entry(i, k), value)
-    # U x = y:  b[k] /= a[k, k], b[i] -= a[i, k] b[k] for i < k, k = n - 1 .. 0
-    with ir.loop(0, "%n") as back:
-        k = ir.backwards(back)
-        value = ir.divide(ir.at("%b", k), ir.entry(k, k))
-        with ir.loop(0, k) as i:
-            ir.subtract_product(ir.at("%b", i), ir.entry(i, k), value)
-    return ir.function("internal void @lu.solve(ptr %a, ptr %p, ptr %b, i64 %n) nounwind")
-
-
-def _lu_solve_transposed_text(arithmetic: Arithmetic) -> list[str]:
-    """`void lu.solve.transposed(double *a, double *p, double *b, int64_t n)`, as `solve_transposed`."""
-    ir = _MatrixWriter(arithmetic)
-    # U^T y = b:  b[k] /= a[k, k], b[i] -= a[k, i] b[k] for i > k, k = 0 .. n - 1
-    with ir.loop(0, "%n") as k:
-        value = ir.divide(ir.at("%b", k), ir.entry(k, k))
-        with ir.loop(ir.integer("add", k, 1), "%n") as i:
-            ir.subtract_product(ir.at("%b", i), ir.entry(k, i), value)
-    # L^T z = y:  b[i] -= a[k, i] b[k] for i < k, k = n - 1 .. 0
-    with ir.loop(0, "%n") as back:
-        k = ir.backwards(back)
-        value = ir.load_at(ir.at("%b", k))
-        with ir.loop(0, k) as i:
-            ir.subtract_product(ir.at("%b", i), ir.entry(k, i), value)
-    # x = P^T z
-    with ir.loop(0, "%n") as back:
-        k = ir.backwards(back)
-        with ir.each_lane() as lane:
+    if not transposed:  # b = P b
+        with ir.loop(0, "%n") as k, ir.each_lane() as lane:
             ir.exchange("%b", k, ir.pivot(k, lane), lane)
-    return ir.function("internal void @lu.solve.transposed(ptr %a, ptr %p, ptr %b, i64 %n) nounwind")
+    for forward in (True, False):
+        with ir.loop(0, "%n") as turn:
+            k = turn if forward else ir.backwards(turn)
+            at = ir.at("%b", k)
+            # by U, whose diagonal is not 1:  b[k] /= a[k, k];  then b[i] -= a[i, k] b[k], of A^T a[k, i] b[k]
+            value = ir.divide(at, ir.entry(k, k)) if forward == transposed else ir.load_at(at)
+            with ir.loop(ir.integer("add", k, 1), "%n") if forward else ir.loop(0, k) as i:
+                ir.subtract_product(ir.at("%b", i), ir.entry(k, i) if transposed else ir.entry(i, k), value)
+    if transposed:  # b = P^T b
+        with ir.loop(0, "%n") as turn:
+            k = ir.backwards(turn)
+            with ir.each_lane() as lane:
+                ir.exchange("%b", k, ir.pivot(k, lane), lane)
+    return ir.function(f"internal void @{name}(ptr %a, ptr %p, ptr %b, i64 %n) nounwind")

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph
+import cgraph as cg
+from cgraph import Graph, Node
 from cgraph._shared import Array, kept_by_first, require_choice
+from cgraph.extend import Builder, building, folded
 
+from ...systems.kinematics import ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import Equation, Output, documented, shortened
 from ..equations_of_motion import forward_dynamics
 from ..mass_matrix.singular_mass_matrix import raise_if_singular
 from ..state_equation import FORMS
-from ..states.evaluate import evaluate
+from ..states.evaluate import evaluate, input_rows
 from ..states.initial_value import normalized
-from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
+from .linearization_parts import by_upper, linearization_parts
 from .momentum_parts import momentum_parts, of_momenta
+
+# Nodes; beyond, slopes along directions are made in a fraction of the time, and soon are as fast.
+WRITTEN_OUT = 20_000
+FORWARD_SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 
 
 @Equation("q qd tau", Output("A_{}_{}", ("2n", "2n")), Output("B_{}_{}", ("2n", "n"))).describes
@@ -80,9 +88,69 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
     return shortened(as_system(model), of_momenta, mirrored=True)
 
 
-def parts_of(system: System, form: str) -> LinearizationParts:
-    """The parts of the linearization of a form, over (q, qd)."""
-    return linearization_parts(system) if form == "velocity" else momentum_parts(system)
+class LinearRows(NamedTuple):
+    """Rows of (A B), (2n, 3n), as a graph, below those that are the same at every state, (0 1 0).
+
+    graph: their entries row by row, or the rates that have them as slopes by `wrt`.  inputs: names of those that a
+    state gives; behind them are displacements, which are 0.  wrt: displacements, velocities and forces, or none.
+    """
+
+    graph: Graph
+    inputs: Sequence[str]
+    wrt: tuple[Node, ...]
+    above: Array
+
+
+def linear_rows(system: System, form: str) -> LinearRows:
+    """All entries, or of a large system the rates that `forward_dynamics` gives."""
+    return _linear_rows(system, form, (tuple(system.forces), tuple(system.damping)))
+
+
+@kept_by_first
+def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows:
+    """The last: forces and damping of the system, which may be given anew."""
+    n, velocity = system.n, form == "velocity"
+    if velocity and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // FORWARD_SHARE:
+        return _displaced(system)
+    parts = linearization_parts(system) if velocity else momentum_parts(system)
+    if velocity and parts.size >= WRITTEN_OUT:
+        return _displaced(system)
+    graph = parts.written_out()
+    above = np.eye(n if velocity and system.kinematics.quasi is None else 0, 3 * n, n)
+    below = range(len(above), 2 * n)
+    names = [[*[f"A_{i}_{j}" for j in range(2 * n)], *[f"B_{i}_{j}" for j in range(n)]] for i in below]
+    rows = _numbered(graph.inputs, [graph.outputs[name] for row in names for name in row])
+    return LinearRows(rows, graph.input_names, (), above)
+
+
+def _displaced(system: System) -> LinearRows:
+    """The rates (xi_dot, qdd) at a state moved by displacements xi from 0, which where velocities are rates are q."""
+    equations, kinematics, n = forward_dynamics(system), system.kinematics, system.n
+    inputs, xi, rates = equations.inputs, system.q, system.qd
+    nodes, none = list(equations.outputs.values())[:n], np.empty((0, 3 * n))  # without multipliers
+    if kinematics.quasi is not None:
+        xi, build = cg.variables([f"xi:{i}" for i in range(n)]), Builder()
+        moves, brackets = folded(kinematics.rate(xi), build), kinematics.brackets(build)
+        with building(build):
+            at = {q: q + move for q, move in zip(system.q, moves, strict=True)}
+            turned = [sum([c * x for c, x in zip(row, xi, strict=True)], ZERO) for row in brackets]
+            rates = [u + turn for u, turn in zip(rates, turned, strict=True)]  # xi_dot = dqd + C xi
+        inputs, nodes = (*inputs, *xi), folded(nodes, build, at)
+    graph = _numbered(inputs, [*rates, *nodes])
+    return LinearRows(graph, equations.input_names, (*xi, *system.qd, *system.tau), none)
+
+
+def _numbered(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
+    return Graph(inputs, {str(k): node for k, node in enumerate(outputs)})
+
+
+def matrices(rows: Array, found: LinearRows) -> tuple[Array, Array]:
+    """A and B of rows of (A B), (.., 2n, 3n), of which those below are there."""
+    n = rows.shape[-1] // 3
+    rows[..., : len(found.above), :] = found.above
+    if found.wrt:  # B is M^-1: of its entries the upper triangle counts
+        rows[..., n:, 2 * n :] = by_upper(rows[..., n:, 2 * n :])
+    return rows[..., : 2 * n], rows[..., 2 * n :]
 
 
 @documented
@@ -102,7 +170,7 @@ def linearize(
     Of quasi-velocities dx is of displacements, see there, too. With constraints the state has to meet them (see
     `consistent_state`), and `reduced_linearization` has the matrices of independent displacements.
 
-    For many states, and for all digits of long chains, there is `linearize_many`.
+    For many states there is `linearize_many`.
 
     Parameters
     ----------
@@ -136,30 +204,32 @@ def linearize(
 
     >>> pendulum = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0])
     >>> A, B = dyn.linearize(pendulum, [0.0, 0.0], [0.0, 0.0], form="momentum")
-    >>> A.round(3).tolist()
+    >>> (A.round(3) + 0.0).tolist()
     [[0.0, 0.0, 1.714, -4.286], [0.0, 0.0, -4.286, 13.714], [-19.62, -4.905, 0.0, 0.0], [-4.905, -4.905, 0.0, 0.0]]
     """
-    system = as_system(model)
-    parts, graphs = _in_columns(
-        system, require_choice("form", form, FORMS), (tuple(system.forces), tuple(system.damping))
-    )
-    flat = evaluate(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
-    if flat.ndim != 1:
+    system, state = as_system(model), {"q": q, "qd": qd, "tau": tau}
+    found, size = linear_rows(system, require_choice("form", form, FORMS)), 3 * system.n
+    x = input_rows(system, found.inputs, state, t, parameters)
+    if x.ndim != 1:
         raise ValueError("linearize takes one state, got rows of several; see linearize_many")
-    factors, sides, rest = np.split(flat, [graphs.factors, graphs.factors + graphs.sides])
-    rows = [*factors, *sides.reshape(-1, graphs.columns)]
-    solved = graphs.column.evaluate(dict(zip(graphs.column.input_names, rows, strict=True))).values()
-    a, b = parts.assembled(sides, rest, np.concatenate([np.broadcast_to(x, graphs.columns) for x in solved]))
+    rows, graph, values = np.empty((2 * system.n, size)), found.graph, x.tolist()
+    if found.wrt:  # along all directions at once
+        graph = _slopes(found.graph, found.wrt)
+        values += [*[0.0] * (len(found.graph.inputs) - len(values)), *np.eye(size)]
+    entries = graph.evaluate(dict(zip(graph.input_names, values, strict=True))).values()
+    rows[len(found.above) :] = (
+        np.reshape([*entries], (-1, size)) if not found.wrt else [np.broadcast_to(each, size) for each in entries]
+    )
+    a, b = matrices(rows, found)
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
-        _raise_what_is_not_finite(system, {"q": q, "qd": qd, "tau": tau}, t, parameters)
+        _raise_what_is_not_finite(system, state, t, parameters)
     return a, b
 
 
 @kept_by_first
-def _in_columns(system: System, form: str, applied: tuple[object, ...]) -> tuple[LinearizationParts, ColumnGraphs]:
-    """The parts of a form, and their graphs.  applied: forces and damping of the system, which may be given anew."""
-    parts = parts_of(system, form)
-    return parts, parts.in_columns()
+def _slopes(graph: Graph, wrt: Sequence[Node]) -> Graph:
+    """The graph's change along directions."""
+    return cg.jvp(graph, wrt)
 
 
 def _raise_what_is_not_finite(

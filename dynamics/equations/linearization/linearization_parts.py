@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array
 from cgraph.extend import Builder, SingularError, as_node, building, cotangents, folded, topological, with_reciprocals
 
 from ...systems.system import System
@@ -26,25 +25,6 @@ from ..mass_matrix.mass_matrix_solve import MassSolve, Rows, mass_solve, smaller
 from .inverse_dynamics_derivatives import state_slopes, torque_derivatives
 
 Matrix = NDArray[Any]  # of numbers, (.., n, k), or of nodes, (n, k)
-
-
-class ColumnGraphs(NamedTuple):
-    """A linearization as two graphs.
-
-    shared: the state to p0.., what columns read, then b_i_0, .., b_i_{k-1} for each row i, the right-hand sides of k
-    columns, then the rest, such as rows of C(qd), xi_dot = dqd + C xi.  column: p0.. and a right-hand side b0.. to
-    x0.., (n,).
-    """
-
-    shared: Graph
-    column: Graph
-    factors: int
-    columns: int
-
-    @property
-    def sides(self) -> int:
-        """Number of entries of the right-hand sides."""
-        return self.columns * (len(self.column.inputs) - self.factors)
 
 
 class LinearizationParts(NamedTuple):
@@ -84,25 +64,6 @@ class LinearizationParts(NamedTuple):
     def written_out(self) -> Graph:
         """All entries of A and B."""
         return linear_graph(self.inputs, *self.matrices())
-
-    def in_columns(self) -> ColumnGraphs:
-        """A graph of the state's part, and one of a column."""
-        factors, column = self.solve.split()
-        outputs = {f"p{k}": node for k, node in enumerate(factors)}
-        columns = [*self.sides, *units(self.n, len(self.solve.b))]
-        blocks = {"b": list(zip(*columns, strict=True)), **self.rest}
-        for name, rows in blocks.items():
-            outputs |= {f"{name}_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
-        shared = with_reciprocals(cg.simplify(Graph(self.inputs, outputs)))
-        return ColumnGraphs(shared, cg.simplify(column), len(factors), len(columns))
-
-    def assembled(self, sides: Array, rest: Array, solutions: Array) -> tuple[Array, Array]:
-        """A and B as numbers, of the outputs of both graphs, flat: right-hand sides, the rest, and all solutions."""
-        shape, n, k = solutions.shape[:-1], self.n, len(self.sides)
-        w, x = (each.reshape(*shape, -1, k + n) for each in (sides, solutions))
-        matrices = np.moveaxis(rest.reshape(*shape, len(self.rest), n, n), -3, 0)
-        with np.errstate(all="ignore"):  # of an M that is singular, which is said by who asks for a state
-            return self.formula(w[..., :k], x[..., :k], by_upper(x[..., k:]), *matrices)
 
 
 def linear_graph(inputs: Sequence[Node], a: Matrix, b: Matrix) -> Graph:

@@ -18,9 +18,8 @@ from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
 from ...simulation.outcome import Recorder
 from ...simulation.run_options import RunOptions
-from ...simulation.steps.integration import integration
+from ...simulation.stepper import Stepper, stepper
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
-from ...simulation.steps.stepping import Integration, NativeRun
 from ..accuracy_task import AccuracyTask
 from ..timing import Timed
 
@@ -81,7 +80,7 @@ def problem_of(task: AccuracyTask) -> Problem:
     return derive(task.model, dict(inputs.parameters) | dict.fromkeys(inputs.applied, 0.0))
 
 
-def finished(run: Integration, start: Array) -> Outcome:
+def finished(run: Stepper, start: Array) -> Outcome:
     """The run, to its end or until it has taken too long."""
     begin, last, status = time.perf_counter(), start, ""
     with np.errstate(all="ignore"):
@@ -94,7 +93,7 @@ def finished(run: Integration, start: Array) -> Outcome:
     return Outcome(np.array(last), run.steps, run.rejected, run.evaluations, run.status or status)
 
 
-def recorded(run: Integration, start: Array, times: Sequence[float]) -> Array:
+def recorded(run: Stepper, start: Array, times: Sequence[float]) -> Array:
     """The states of a run at some times, (T, m)."""
     recorder = Recorder(start, np.array(times))
     begin = time.perf_counter()
@@ -138,11 +137,11 @@ class Ours(Solver):
         if self.kind == EQUAL and self._at_least(knob) > LONGEST_RUN:  # one that does not look at the clock on its way
             return Run(lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s"))
         compiled, options = self._plain, self._options(knob, [self.task.t_end])
-        return Run(lambda: finished(integration(NativeRun(compiled, options)), self.start))
+        return Run(lambda: finished(stepper(compiled, options), self.start))
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
-        run = integration(NativeRun(self._plain, self._options(knob, [self.task.t_end], TRIAL)))
+        run = stepper(self._plain, self._options(knob, [self.task.t_end], TRIAL))
         begin = time.perf_counter()
         finished(run, self.start)
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
@@ -151,4 +150,4 @@ class Ours(Solver):
         """The states at the task's times, (T, m); NaN from where it stopped."""
         options = self._options(knob, self.task.times)
         compiled = self._dense if options.between else self._plain
-        return recorded(integration(NativeRun(compiled, options)), self.start, self.task.times)
+        return recorded(stepper(compiled, options), self.start, self.task.times)

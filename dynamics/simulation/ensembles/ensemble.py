@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph._shared import Array
+from cgraph._shared import Array, install
 
 from ..outcome import REACHED
-from ..trajectory import Crossings, Stats
-from .tables import to_pandas, to_xarray
+from ..trajectory import Crossings
 
 if TYPE_CHECKING:
     import pandas
@@ -69,56 +69,62 @@ class EnsembleStats:
     warnings: tuple[tuple[str, ...], ...]
 
 
-COLUMNS: dict[str, type] = dict.fromkeys(("steps", "rejected", "nfev", "status"), np.int64) | {"success": np.bool_}
-COLUMNS |= dict.fromkeys(("dt", "error", "error_at_end"), np.float64)  # None is NaN
+COLUMNS: dict[str, type] = {
+    **dict.fromkeys(("steps", "rejected", "nfev", "status"), np.int64),
+    **dict.fromkeys(("dt", "error", "error_at_end"), np.float64),  # None is NaN
+    "success": np.bool_,
+    **dict.fromkeys(("message", "warnings"), np.object_),
+}
 
 
-class RunTable:
-    """Statistics of runs side by side, a row of `Stats` each, set as they end.
+def doubts(stats: EnsembleStats) -> list[str]:
+    """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
+    early = np.flatnonzero(stats.status < 0)
+    doubtful = [k for k, texts in enumerate(stats.warnings) if texts] if any(stats.warnings) else []
+    many, have, said = f"of {len(stats.warnings)} trajectories", "has" if len(doubtful) == 1 else "have", list[str]()
+    for k in early[:1].tolist():
+        said.append(f"{len(early)} {many} stopped early: trajectory {k} {stats.message[k].removeprefix('stopped ')}")
+    for k in doubtful[:1]:
+        said.append(f"{len(doubtful)} {many} {have} a warning: trajectory {k}: {stats.warnings[k][0]}")
+    return said
 
-    columns: {name: numbers of all}.  messages, warnings: of each.
+
+class Part:
+    """Results of trajectories first, first + 1, ..: rows (k, T, m), NaN after one has stopped, and their statistics.
+
+    columns: {name of `EnsembleStats`: of each}, and "happened", the events of each.
     """
 
-    def __init__(self, count: int) -> None:
-        self.columns: dict[str, Any] = {name: np.zeros(count, dtype=kind) for name, kind in COLUMNS.items()}
-        self.columns["status"][:] = -1
-        self.columns["error"][:] = self.columns["error_at_end"][:] = np.nan
-        self.messages: list[str] = [""] * count
-        self.warnings: list[tuple[str, ...]] = [()] * count
+    def __init__(self, first: int, rows: Array) -> None:
+        """Before the first step; rows: where they are to be."""
+        self.first, self.rows = first, rows
+        kinds = {**COLUMNS, "happened": np.object_}
+        self.columns: dict[str, Any] = {name: np.zeros(len(rows), dtype=kind) for name, kind in kinds.items()}
+        self.put(slice(None), status=-1, error=np.nan, error_at_end=np.nan, message="")
+        self.columns["warnings"].fill(())
+        self.columns["happened"].fill(())
 
-    def set(self, k: int, stats: Stats) -> None:
-        """Row k."""
-        for name, column in self.columns.items():
-            column[k] = getattr(stats, name)
-        self.messages[k], self.warnings[k] = stats.message, stats.warnings
-
-    def stopped(self, k: int, message: str, **columns: float) -> None:
-        """Row k, of a run that stopped early."""
-        for name, value in columns.items():
-            self.columns[name][k] = value
-        self.messages[k] = message
-
-    def reached(self, which: Counts, **columns: Any) -> None:
-        """The rows `which`, of runs that reached their end."""
-        for name, values in {**columns, "success": True, "status": 0}.items():
+    def put(self, which: Any, **columns: Any) -> None:
+        """Set columns of these."""
+        for name, values in columns.items():
             self.columns[name][which] = values
-        if len(which) == len(self.messages):
-            self.messages = [REACHED] * len(which)
-        for k in which.tolist() if len(which) < len(self.messages) else ():
-            self.messages[k] = REACHED
 
-    def put(self, here: slice, part: RunTable) -> None:
-        """The rows of a part, in their place."""
-        for name, column in self.columns.items():
-            column[here] = part.columns[name]
-        self.messages[here], self.warnings[here] = part.messages, part.warnings
+    def reached(self, which: Any, **columns: Any) -> None:
+        """Set columns of these, which reached their end."""
+        self.put(which, **columns, success=True, status=0, message=REACHED)
 
-    def stats(self, method: str, seconds: float, more: Mapping[int, Sequence[str]]) -> EnsembleStats:
-        """The statistics.  more: what speaks against results besides."""
-        for k, texts in more.items():
-            self.warnings[k] = (*self.warnings[k], *texts)
-        said = tuple(self.warnings)
-        return EnsembleStats(method, seconds=seconds, message=tuple(self.messages), warnings=said, **self.columns)
+    def place(self, part: Part) -> None:
+        """Put the results of a part in their place."""
+        here = slice(part.first, part.first + len(part.rows))
+        if not np.may_share_memory(part.rows, self.rows):  # from another process
+            self.rows[here] = part.rows
+        self.put(here, **part.columns)
+
+    def stats(self, method: str, seconds: float) -> EnsembleStats:
+        """The statistics."""
+        columns = {name: self.columns[name] for name in COLUMNS}
+        columns |= {name: tuple(columns[name].tolist()) for name in ("message", "warnings")}
+        return EnsembleStats(method, seconds=seconds, **columns)
 
 
 @dataclass(frozen=True)
@@ -202,7 +208,19 @@ class Ensemble:
         >>> table["q.x"].loc[1, 1.0].round(3), table["k"].loc[1, 1.0]
         (np.float64(-0.416), np.float64(4.0))
         """
-        return to_pandas(self)
+        module, (many, rows, _) = _module("pandas"), self.q.shape
+        blocks = {"q": (self.coordinates, self.q), "qd": (self.velocities, self.qd)}
+        blocks |= {} if self.p is None else {"p": (self.velocities, self.p)}
+        columns = {
+            f"{letter}.{name}": values[:, :, k].reshape(-1)
+            for letter, (names, values) in blocks.items()
+            for k, name in enumerate(names)
+        }
+        message = np.array(self.stats.message, object)
+        own = {**self.parameters, "success": self.stats.success, "message": message}
+        columns |= {name: np.repeat(values, rows) for name, values in own.items()}
+        index = module.MultiIndex.from_product([np.arange(many), self.t], names=["trajectory", "t"])
+        return module.DataFrame(columns, index)
 
     def to_xarray(self) -> xarray.Dataset:
         """Arrays with names (extra `tables`): all but `events`, whose number differs from trajectory to trajectory.
@@ -226,4 +244,34 @@ class Ensemble:
         >>> fan.to_xarray().q.sel(coordinate="joint 1", t=1.0).values.round(4)
         array([-0.077, -0.155])
         """
-        return to_xarray(self)
+        module, stats = _module("xarray"), self.stats
+        by_time, of_start = ("trajectory", "t"), ("trajectory",)
+        columns = {"q": ("coordinate", self.q, self.q_start), "qd": ("velocity", self.qd, self.qd_start)}
+        variables: dict[str, Any] = {}
+        for name, (dimension, rows, start) in columns.items():
+            variables[name] = ((*by_time, dimension), rows)
+            variables[f"{name}_start"] = ((*of_start, dimension), start)
+        if self.p is not None:
+            variables["p"] = ((*by_time, "velocity"), self.p)
+        for name in ("steps", "rejected", "nfev", "dt", "success", "status", "error", "error_at_end"):
+            variables[name] = (of_start, getattr(stats, name))
+        variables["message"] = (of_start, np.array(stats.message))
+        variables["warnings"] = (of_start, np.array(["; ".join(said) for said in stats.warnings]))
+        if shared := sorted({"trajectory", "t", "coordinate", "velocity", *variables} & {*self.parameters}):
+            raise ValueError(f"the parameter {shared[0]!r} has the name of a column of the table: give it another name")
+        coordinates = {
+            "trajectory": np.arange(len(self.q)),
+            "t": self.t,
+            "coordinate": list(self.coordinates),
+            "velocity": list(self.velocities),
+            **{name: (of_start, values) for name, values in self.parameters.items()},
+        }
+        return module.Dataset(variables, coordinates, {"method": stats.method})
+
+
+def _module(name: str) -> Any:
+    """The package. Raises ImportError that names the extra."""
+    try:
+        return import_module(name)
+    except ImportError:
+        raise ImportError(f"this table needs {name}: {install('tables')}") from None

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,23 +16,30 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph._shared import Array, require_path, require_whole
 
-from ...equations.states.initial_value import InitialValues, initial_values
-from ...integrators import Problem, derive, in_form
+from ...equations.state_equation import FORMS
+from ...equations.states.initial_value import initial_values
+from ...integrators import derive, in_form
 from ...systems.model import Model
-from ..events.event import Event, EventProgram, as_events, event_program
-from ..events.event_log import split_crossings
-from ..moving import with_applied
-from ..row_values import converted, unreached_momenta
-from ..run_options import METHOD, RunOptions, require_room, time_span
-from ..sampled_controller import SampledController
+from ..applied_force import SampledController, with_applied
+from ..events.event import Event, as_events, event_program
+from ..outcome import split_crossings
+from ..progress_bar import Progress
+from ..run_options import METHOD, Options, RunOptions, require_room, time_span
 from ..steps.equal_steps import step_count
+from ..steps.row_values import converted
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
-from .ensemble import Ensemble
-from .shares import chunk_width, doubts, run_chunks, side_by_side
+from ..unreached_momenta import unreached_momenta
+from .ensemble import Ensemble, Part, doubts
 from .store import Store, sweep_of
-from .task import Part, Task
-from .workers import Workers, checked
+from .task import Chunk, Task
+from .workers import Team, Workers, checked, finished
+
+
+class ManyOptions(Options, total=False):
+    """Keywords of many runs."""
+
+    chunk: int | None
 
 
 def simulate_many(
@@ -43,26 +49,13 @@ def simulate_many(
     t_end: float | None = None,
     method: str = METHOD,
     *,
-    t0: float = 0.0,
-    t_span: ArrayLike | None = None,
-    dt: float | None = None,
-    max_step: float | None = None,
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
     events: Event | Iterable[Event] = (),
     tau: ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
     workers: Workers = 1,
-    chunk: int | None = None,
-    first_step: float | None = None,
-    max_steps: float = math.inf,
-    estimate_error: bool | None = None,
-    backend: str = "auto",
-    fma: bool = True,
-    progress: bool | None = None,
-    form: str = "velocity",
     store: str | os.PathLike[str] | None = None,
+    **options: Unpack[ManyOptions],
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
@@ -79,10 +72,8 @@ def simulate_many(
     q, qd : array_like
         The starts, (N, nq) and (N, n) [rad or m, per second], or (nq,) and (n,) for all, as in `simulate`; of an
         OdeSystem q is the state, and qd None.
-    t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error
+    t_end, method
         As in `simulate`.
-    backend, fma, progress, form
-        As in `simulate`, too.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
         steps need it.
@@ -101,14 +92,14 @@ def simulate_many(
         How many threads share the work, None for one on each core; or an executor of `concurrent.futures`, such as
         Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The numbers are the same to the last
         bit.
-    chunk : int, optional
-        Trajectories that a worker takes at a time; by default up to four chunks for each worker, of at most 4096
-        trajectories, fewer where they have many rows, and of at most 256 one by one or with a `store`. Side by side it
-        is rounded up to whole vectors, multiples of 8.
     store : path, optional
         A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
         was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder, which one
         call at a time writes. A chunk that had not ended is lost.
+    **options
+        Those of `dyn.Options` but `dense_output`; and `chunk`, how many trajectories a worker takes at a time: by
+        default up to four chunks for each worker, of at most 4096 trajectories, fewer where they have many rows, and of
+        at most 256 one by one or with a `store`. Side by side it is rounded up to whole vectors, multiples of 8.
 
     Returns
     -------
@@ -140,58 +131,120 @@ def simulate_many(
     [-0.077, -0.155, -0.2348]
     """
     # Check
-    folder = _check(chunk, tau, store)
-    t0, t_end = time_span(t_end, t0, t_span)
-    arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
-    options = RunOptions(t_end, method, *arguments, t0, estimate_error, fma)
+    chunk, form = options.pop("chunk", None), options.pop("form", FORMS[0])
+    if chunk is not None:
+        require_whole("chunk", chunk, 1)
+    force: object = tau
+    if isinstance(force, SampledController):
+        what = "call simulate for each start, or write the controller in closed form"
+        raise TypeError(f"a SampledController may remember what it has seen, and so controls one run: {what}")
+    folder = None if store is None else require_path("store", store)
+    t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
+    run = RunOptions.of(method, options, t0, t_end, t_eval, without=["dense_output"])
     watched, team = as_events(events), checked(workers)
-    model, applied = with_applied(model, tau, parameters)
-    start = initial_values(model, q, qd, applied.constant, parameters, t0)
-    options.check(start.states)
-    count = _row_count(options, *start.x.shape, stored=store is not None)
+    applied = with_applied(model, tau, parameters)
+    start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
+    run.check(start.states)
+    _require_room(run, *start.x.shape, stored=folder is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them
-    begin, problem = time.perf_counter(), in_form(derive(model, start.bound), form)
-    program = step_program(problem, options.integrator, dense=bool(watched) or options.between)
-    watch = event_program(problem, watched)
-
-    # Share out the work: what a worker is sent, and the starts of chunks of trajectories
-    grids, lanes = ([], False) if watched else side_by_side(program, options, len(start.x))
-    sent = replace(options, t_eval=options.row_times) if watched else options
-    task = Task(program, sent, count, tuple(grids), watch if watched else None, lanes)
-    x, p = _stepped(problem, start, t0)
-    width = chunk_width(len(x), chunk, team, count * program.steps.width * lanes, grids, stored=folder is not None)
+    begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
+    program = step_program(problem, run.integrator, dense=bool(watched) or run.between)
+    watch, nq = event_program(problem, watched), problem.nq
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    with _opened(folder, problem, task, x, p, width) as kept:
-        whole = run_chunks(task, x, p, width, team, kept)
+    sent = replace(run, t_eval=run.row_times) if watched else run
+    task = Task(program, sent, len(start.x), watch if watched else None)
+    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
+    x = converted(problem.momentum, t0, start.x, p)
+    width, shape = task.width(chunk, team, stored=folder is not None), (len(x), task.count, x.shape[1])
+    if folder is None:
+        whole = _run_chunks(task, x, p, width, team)
+    else:
+        with closing(Store(folder, sweep_of(problem, task, x, p), width, shape)) as kept:
+            whole = _run_chunks(task, x, p, kept.width, team, kept)
 
     # Put the result together
-    result = _ensemble(problem, watch, options, whole, (start, x, p), time.perf_counter() - begin)
-    for text in doubts(result.stats):
+    times, rows = run.row_times, whole.rows
+    logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.columns["happened"]) if watched]
+    for k in range(len(x)) if problem.missing is not None else ():
+        missed = unreached_momenta(problem, times, rows[k], p[k], start=(t0, start.x[k], x[k]))
+        whole.columns["warnings"][k] += tuple(missed)
+    stats = whole.stats(method, time.perf_counter() - begin)
+    for text in doubts(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    return result
+    return Ensemble(
+        times,
+        rows[:, :, :nq],
+        converted(problem.velocities, times, rows, p[:, None])[:, :, nq:],
+        stats,
+        {event.name: tuple([named[event.name] for named in logs]) for event in watch.events},
+        rows[:, :, nq:] if problem.momenta else None,
+        start.x[:, :nq],
+        start.x[:, nq:],
+        start.varied,
+        problem.model.coordinates,
+        problem.model.velocities,
+    )
 
 
-def _stepped(problem: Problem, start: InitialValues, t0: float) -> tuple[Array, Array]:
-    """The states (N, m) that the steps start from, and the parameters of the problem, (N, ..)."""
-    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
-    return converted(problem.momentum, t0, start.x, p), p
+def ends_of(task: Task, x: Array, p: Array, workers: Workers) -> Array:
+    """The last rows (N, m) of motions from states x (N, m) with parameters p (N, ..); NaN, with a warning, of some."""
+    team, rows = checked(workers), np.empty((len(x), 1, x.shape[1]))
+    with np.errstate(all="ignore"):
+        found = task.run_lanes(x, p, rows, lambda: False) if team == 1 and len(x) <= task.largest else None
+    if found is None or not found[0].all() or any(found[1].get("warnings", ())):
+        whole = _run_chunks(task, x, p, task.width(None, team), team)
+        rows = whole.rows
+        for text in doubts(whole.stats(task.options.method, 0.0)):
+            warnings.warn(text, SimulationWarning, stacklevel=3)
+    return rows[:, 0]
 
 
-def _opened(
-    folder: Path | None, problem: Problem, task: Task, x: Array, p: Array, width: int
-) -> AbstractContextManager[Store | None]:
-    """The store in that folder, for this call alone."""
-    if folder is None:
-        return nullcontext()
-    return closing(Store(folder, sweep_of(problem, task, x, p), width, (len(x), task.count, x.shape[1])))
+def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None = None) -> Part:
+    """Run the chunks, by whoever shares them, until all parts have come.
+
+    Those that a store has are taken from there, and others are kept there as they end.
+    Raises ValueError unless all parts come.
+    """
+    rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
+    whole, came = Part(0, rows), dict[int, int]()  # trajectories, by the first
+    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
+    if store is not None:
+        known = {chunk.first: part for chunk in chunks if (part := store.part(chunk)) is not None}
+        for part in known.values():
+            whole.place(part)
+            came[part.first] = len(part.rows)
+        chunks = [chunk for chunk in chunks if chunk.first not in known]
+        if chunks:
+            store.lock()
+    try:
+        with (
+            Progress("simulate", len(x), task.options.progress) as report,
+            closing(finished(task, chunks, workers, whole.rows)) as parts,
+        ):
+            for part in parts:
+                whole.place(part)
+                if store is not None:
+                    store.keep(part)
+                came[part.first] = len(part.rows)
+                report(sum(came.values()))
+    except KeyboardInterrupt:
+        if store is None:
+            raise
+        raise KeyboardInterrupt(store.kept(sum(came.values()))) from None
+    if (done := sum(came.values())) != len(x):
+        back = f"of {len(x)} trajectories came back {done}"
+        raise ValueError(f"workers must give a result for each item, as map does: {back}")
+    if store is not None:
+        whole.rows = store.read_only()
+    return whole
 
 
-def _row_count(options: RunOptions, many: int, m: int, *, stored: bool) -> int:
-    """Rows of a trajectory, T, of so many of m numbers.  stored: in a file, not in memory.
+def _require_room(options: RunOptions, many: int, m: int, *, stored: bool) -> None:
+    """Raises ValueError if trajectories would not have the same rows, MemoryError if all would not fit.
 
-    Raises ValueError where trajectories would not have the same, MemoryError where all would not fit.
+    stored: in a file, not in memory.
     """
     if options.times is None and options.adaptive:
         raise ValueError(
@@ -203,49 +256,3 @@ def _row_count(options: RunOptions, many: int, m: int, *, stored: bool) -> int:
     what = f"{many} trajectories of {count} rows of {m} numbers"
     if not stored:
         require_room(8 * many * count * m, what, "record fewer times (t_eval), simulate fewer at once or name a store")
-    return count
-
-
-def _ensemble(
-    problem: Problem,
-    watch: EventProgram,
-    options: RunOptions,
-    whole: Part,
-    starts: tuple[InitialValues, Array, Array],
-    seconds: float,
-) -> Ensemble:
-    """Ensemble of all that has come.  starts: as given, their states (N, m), and the parameters of the problem."""
-    times, rows, nq, (start, x, p) = options.row_times, whole.rows, problem.nq, starts
-    logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.happened)]
-    crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
-    missed: dict[int, list[str]] = {}
-    for k in range(len(x)) if problem.missing is not None else ():
-        missed[k] = unreached_momenta(problem, times, rows[k], p[k], start=(options.t0, start.x[k], x[k]))
-    stats = whole.runs.stats(options.method, seconds, missed)
-    states = converted(problem.velocities, times, rows, p[:, None])
-    momenta = rows[:, :, nq:] if problem.momenta else None
-    return Ensemble(
-        times,
-        rows[:, :, :nq],
-        states[:, :, nq:],
-        stats,
-        crossings,
-        momenta,
-        start.x[:, :nq],
-        start.x[:, nq:],
-        start.varied,
-        problem.model.coordinates,
-        problem.model.velocities,
-    )
-
-
-def _check(chunk: int | None, tau: object, store: str | os.PathLike[str] | None) -> Path | None:
-    """The folder of a store. Raises for what is wrong with these arguments alone."""
-    if chunk is not None:
-        require_whole("chunk", chunk, 1)
-    if isinstance(tau, SampledController):
-        raise TypeError(
-            "a SampledController may remember what it has seen, and so controls one run: call simulate for each start, "
-            "or write the controller in closed form"
-        )
-    return None if store is None else require_path("store", store)

@@ -1,317 +1,324 @@
-"""Error estimate of runs of equal steps: their differences from runs beside them, of longer steps (Richardson).
+"""Error estimate of runs of equal steps: how far they are from runs beside them, of longer steps (Richardson).
 
 With an error that is e = C h^p along the run, x(2h) - x(h) = (2^p - 1) e, and x(4h) - x(2h) is 2^p times as large; how
-much larger it is tells the order that the run has. Across a jump or a kink of the rate these runs may be off alike, and
-what a step can miss there is the least that is said. Of steps that are not all equal, 2^p is the ratio of the sums of
-h^(p + 1). This is the error of the state, phase included, not that of the energy.
+much larger it is tells the order that the run has. Of steps that are not all equal, 2^p is the ratio of the sums of
+h^(p + 1). Across a jump or a kink of the rate these runs may be off alike, and what a step can miss there is the least
+that is said. This is the error of the state, phase included, not that of the energy.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, cast
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from cgraph._shared import Array
 
 from ..run_options import RunOptions
+from ..stepper import EqualStepper, Stepper
 from ..steps.dense_output import StepBlock
-from ..steps.equal_steps import SAME_INSTANT, EqualSteps, equal_steps
+from ..steps.equal_steps import (
+    SAME_INSTANT,
+    EqualSteps,
+    Numbers,
+    equal_steps,
+    instants_of,
+    longer_steps,
+    sampled_numbers,
+)
+from ..steps.state_sizes import Flags, off_by
 from ..steps.step_program import StepProgram
-from ..steps.stepping import FixedStepIntegration, Integration
-from .runs_beside import LATE, SHARE, Course, Difference, Law, States, courses, even, together
-from .state_sizes import off_by
-from .unresolved import missed, turning, unresolved
+from .unresolved import Watch
 
-if TYPE_CHECKING:
-    from ..events.event_log import WatchedIntegration
-
+APART_RATIO = 1.5  # the ratio of errors from which a difference of two runs tells them
 LEAST_RATIO = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 UNIT = 2.0**-52  # the last bit of a number near 1
-NUDGE = 8.0 * UNIT  # of each component, by which runs beside start aside: what roundings grow to is part of the error
-TOGETHER = 512  # states that are compared at once
+ASIDE = 1.0 + 8.0 * UNIT  # times each component, runs beside start: what roundings grow to is part of the error
+FOUR = 4  # steps, at whose ends those of all runs end
+LOOKS = 1024  # instants at which runs are compared, at most
+LATE, SHARE = 2.0, 0.1  # steps, or of the time between resets: runs parted for longer take other courses
 UNKNOWN = "the error is unknown"
 
 
-class ErrorEstimates(NamedTuple):
-    """Of k runs: the largest errors and those at the end, relative to the sizes of components, (k,); NaN if unknown.
+class Law(NamedTuple):
+    """How differences tell the error of a run whose longest step is so long [s].
 
-    warnings: where more was asked for, a sentence each, else empty.
+    share: of the first difference, that is error, if the error is a power of the step.  ratio: of the second difference
+    to the first then.
     """
 
-    largest: Array
-    last: Array
-    warnings: list[str]
+    longest: float
+    share: float
+    ratio: float = 1.0
 
 
-@dataclass
-class _Beside:
-    """A run beside: its course, its states as they come, and how far they have."""
-
-    course: Course
-    states: Iterator[States]
-    t: float
-    resets: int = 0
-    lost: bool = False
+def law_of_halves(longest: float, order: int) -> Law:
+    """The law if the run beside has steps of half the length."""
+    return Law(longest, 1.0 / (1.0 - 0.5**order))
 
 
-Follow = Callable[[Course, Array, Array], Iterator[States]]
+class RunsBeside(NamedTuple):
+    """Runs beside one of equal steps, which is looked at after so many of its steps, at instants t, (T,) each.
 
-
-@dataclass
-class Estimator:
-    """The errors of k runs side by side, which are told their states as they come to them.
-
-    p: values of the parameters, (k, ..).  follow: runs of a course from states x (k, m) with parameters p; they stop
-    after a reset, which is not compared, until the first run has had its own.
-    sparse: whether to look only where the longest steps end, which is where all do.
+    runs: the steps of each, and how many are done then.
     """
 
-    program: StepProgram
-    options: RunOptions
-    p: Array
-    follow: Follow
-    sparse: bool
-    _beside: list[_Beside] = field(default_factory=list, init=False)
-    _differences: list[Difference] = field(default_factory=list, init=False)
-    _pending: list[States] = field(default_factory=list, init=False)
+    law: Law
+    runs: list[tuple[list[EqualSteps], Numbers]]
+    numbers: Numbers
+    t: Array
 
-    def __post_init__(self) -> None:
-        k, m = len(self.p), self.program.size
-        self._size, self._steps, self._law = np.zeros((k, m)), 0, Law(1.0, 1.0)
-        self._turning, self._longest = np.zeros(k), 0.0  # rad/s, of sines and cosines; s, of steps
-        self._bent = np.zeros(k, dtype=bool)  # whether a jump or a kink was passed
-        self._missed = np.zeros((k, m))  # by how much steps across jumps and kinks are off
-        self._unresolved = unresolved(self.program.rate)
-        self._end: States | None = None  # of what was compared
-        self._begun = self.options.t0  # the segment [s]
 
-    def begin(self, x: Array, stretches: Sequence[EqualSteps], *, shorter: bool = False) -> None:
-        """The runs start from x (k, m), on these steps."""
-        made, self._law = courses(stretches, self.program.order, shorter=shorter)
-        self._size, self._end = np.abs(x), States(np.array([self.options.t0]), x[:, None])
-        self._longest = max(abs(part.h) for part in stretches)
-        self._differences = [Difference(len(x), self.program.size, self.options.direction) for _ in made]
-        for course in made:
-            course.follow(stretches)
-            self._beside.append(_Beside(course, self.follow(course, x * (1.0 + NUDGE), self.p), self.options.t0))
+def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
+    """Runs of steps twice and four times as long; if there are too few of them, one of steps half as long."""
+    steps, longest = sum([part.steps for part in stretches]), max([abs(part.h) for part in stretches])
+    numbers = sampled_numbers(steps, FOUR, LOOKS)
+    t = instants_of(stretches, numbers)
+    runs = [longer_steps(t, numbers, times) for times in (2, 4)]
+    one, two, four = [
+        sum([part.steps * (abs(part.h) / longest) ** (order + 1) for part in each])
+        for each in (stretches, runs[0][0], runs[1][0])
+    ]
+    if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
+        return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
+    half = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
+    numbers = sampled_numbers(steps, 1, LOOKS)
+    return RunsBeside(law_of_halves(longest, order), [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
 
-    @property
-    def longer(self) -> bool:
-        """Whether the runs beside have longer steps."""
-        return len(self._beside) > 1
 
-    @property
-    def every(self) -> bool:
-        """Whether all steps are looked at, for one may pass a jump or a kink."""
-        return not self.longer or self._unresolved.branches is not None
+class Comparison(NamedTuple):
+    """States of k runs, and of those beside them, at instants t (T,).
 
-    def segment(self, stretches: Sequence[EqualSteps]) -> None:
-        """Go on with these steps after a reset."""
-        lasted, self._begun = abs(stretches[0].begin - self._begun), stretches[0].begin
-        for beside in self._beside:
-            beside.course.follow(stretches, lasted)
+    rows: (k, T, m) each, not finite where a run has stopped.  alike: of each and the next, which rows can be compared;
+    all by default.  lost: when one takes another course.
+    """
 
-    def restart(self, x: Array, stretch: EqualSteps, p: Array) -> None:
-        """The runs are at x (k, m), at the start of a stretch with parameters p: errors of stretches add up."""
-        self._compare()
-        self.p = p
-        for beside, difference in zip(self._beside, self._differences, strict=True):
-            difference.restart()
-            beside.course.follow([stretch])
-            beside.states, beside.t = self.follow(beside.course, x, p), stretch.begin
+    t: Array
+    rows: Sequence[Array]
+    alike: Sequence[Flags] = ()
+    lost: float = math.nan
 
-    def add(self, states: States) -> None:
-        """The next states of the runs."""
-        if self._pending and states.resets != self._pending[-1].resets:
-            self._compare()
-        self._pending.append(states)
-        self._steps += len(states.t)
-        if sum(len(each.t) for each in self._pending) >= TOGETHER:
-            self._compare()
 
-    def _compare(self) -> None:
-        """Bring the runs beside to where the first are, and note by how much they differ."""
-        states = together(self._pending, self._pending[0].resets) if self._pending else None
-        if states is None:
-            return
-        self._pending.clear()
-        end = float(states.t[-1])
-        self._look(states)
-        if self.sparse and self.longer:
-            met = np.flatnonzero(self._beside[-1].course.meets(states.t))
-            states = States(states.t[met], states.x[:, even(met)], states.resets)
-        if len(states.t):
-            size = np.maximum(states.x.max(axis=1), -states.x.min(axis=1))
-            self._size = np.maximum(self._size, np.where(np.isfinite(size), size, 0.0))
-            self._differences[0].add(0, states)
-        for number, beside in enumerate(self._beside):
-            for each in self._until(beside, end, states.resets):
-                self._differences[number].add(1, each)
-                if number + 1 < len(self._differences):
-                    self._differences[number + 1].add(0, each)
-        for difference in self._differences:
-            difference.compare(states.resets)
+def error_estimates(
+    program: StepProgram, options: RunOptions, law: Law, watch: Watch, steps: int, compared: Comparison
+) -> dict[str, Array]:
+    """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
-    def _look(self, states: States) -> None:
-        """Note how fast sines and cosines turn, and what steps across jumps and kinks miss."""
-        t, x, what = states.t, states.x, self._unresolved
-        if self._end is not None and self._end.resets == states.resets:
-            t, x = np.append(self._end.t, t), np.concatenate([self._end.x, x], axis=1)
-        if len(t) > 1 and what.waves is not None:
-            self._turning = np.maximum(self._turning, turning(what.waves, t, x, self.p))
-        if len(t) > 1 and what.branches is not None:
-            bent, error = missed(what, self.program.order, t, x, self.p)
-            self._bent |= bent
-            self._missed += error
-        self._end = States(t[-1:], x[:, -1:], states.resets)
-
-    def _until(self, beside: _Beside, end: float, resets: int) -> Iterator[States]:
-        """States of a run beside until it is at `end` after so many resets, unless it takes another course."""
-        direction, rounding, course = self.options.direction, SAME_INSTANT * np.spacing(abs(end)), beside.course
-        while not beside.lost and beside.resets <= resets:
-            ahead = direction * (beside.t - end)
-            if ahead >= -rounding if beside.resets == resets else ahead > course.late:
-                beside.lost = beside.resets < resets
-                break
-            following = next(beside.states, None)
-            if following is None:
-                beside.lost = True
-                break
-            new, beside.t, beside.resets = following.resets > beside.resets, float(following.t[-1]), following.resets
-            if not new:
-                yield following
-        if beside.resets > resets:
-            late = max(LATE * course.longest, SHARE * abs(beside.t - self._begun))
-            beside.lost = beside.lost or direction * (end - beside.t) > late
-        if beside.lost:
-            for difference in self._differences[self._beside.index(beside) :]:
-                difference.lose(beside.t)
-
-    def estimates(self) -> ErrorEstimates:
-        """Estimate of each run, and whether the run is as good as asked; NaN where nothing could be compared."""
-        self._compare()
-        first, count = self._differences[0], len(self._size)
-        if not first.compared and np.isnan(first.lost).all():
-            return ErrorEstimates(np.full(count, math.nan), np.full(count, math.nan), [""] * count)
-        scale = self.program.kinds.scale(self._size)
-        least = UNIT * math.sqrt(self._steps)
-        largest, last = (
-            np.maximum(least, self._errors([np.where(change > 0.0, change / scale, 0.0) for change in changes]))
-            for changes in zip(*[(each.largest, each.last) for each in self._differences], strict=True)
-        )
-        across = np.where(self._missed > 0.0, self._missed / scale, 0.0)
-        largest, last = np.maximum(largest, across), np.maximum(last, across)
-        largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
-        resolved = math.pi * max(1.0, 0.5 * self.program.order) / self._longest  # rad/s: two evaluations in a turn
-        largest[self._turning > resolved] = last[self._turning > resolved] = math.inf
-        options = self.options
-        allowed = options.absolute + options.relative * scale
-        warnings = [""] * count
-        for k in np.flatnonzero(~(largest * scale <= allowed).all(axis=1) | ~np.isnan(first.lost)).tolist():
-            if self._turning[k] > resolved:
-                said = (
-                    f"{UNKNOWN}: a sine or cosine of the equations turns at {self._turning[k]:.3g} rad/s, and steps of "
-                    f"{self._longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
-                )
-            elif not math.isnan(first.lost[k]):
-                at = f"t = {first.lost[k]:.6g} s"
-                said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
-            else:
-                said = off_by(largest[k], scale[k], allowed[k], self.program.components)
-            warnings[k] = (
-                f"{said}; rtol = {options.relative:g} allows less: take a dt shorter than {options.step:g} s, or "
-                "method='dop853', which chooses its steps"
+    The errors are relative to the sizes of components, NaN if nothing was compared, and infinite if unknown.
+    """
+    t, rows, alike, lost = compared
+    many, warnings = len(rows[0]), np.zeros(len(rows[0]), dtype=np.object_)
+    warnings.fill(())
+    if len(rows) == 1:
+        return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
+    watch.look()
+    between = [other - one for one, other in itertools.pairwise(rows)]
+    for k, each in enumerate(between):
+        np.abs(each, out=each)
+        if alike:
+            each[:, ~alike[k]] = 0.0
+    at_end = int(np.flatnonzero(alike[0])[-1]) if alike else -1
+    scale = program.kinds.scale(np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)))
+    peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in between]]
+    since = np.full(many, lost)
+    for k in np.flatnonzero(np.isinf(peaks[0]).any(axis=1)).tolist():
+        since[k] = t[np.argmin(np.isfinite(between[0][k]).all(axis=1))]
+    with np.errstate(all="ignore"):
+        measured = peaks[-1] / peaks[0]
+        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], between[0][:, at_end], watch.missed)]
+    least = np.maximum(shares[2], UNIT * math.sqrt(steps))
+    largest, last = [np.maximum(least, _errors(each, measured, law, watch.bent)) for each in shares[:2]]
+    largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
+    resolved = math.pi * max(1.0, 0.5 * program.order) / law.longest  # rad/s: two evaluations in a turn
+    for unseen in (watch.turning > resolved, ~np.isnan(since)):
+        largest[unseen] = last[unseen] = math.inf
+    allowed = options.absolute + options.relative * scale
+    for k in np.flatnonzero(~(largest * scale <= allowed).all(axis=1)).tolist():
+        if watch.turning[k] > resolved:
+            said = (
+                f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
+                f"{law.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
             )
-        return ErrorEstimates(largest.max(axis=1), last.max(axis=1), warnings)
+        elif not math.isnan(since[k]):
+            at = f"t = {since[k]:.6g} s"
+            said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
+        else:
+            said = off_by(largest[k], scale[k], allowed[k], program.components)
+        how = f"a dt shorter than {options.step:g} s, or method='dop853', which chooses its steps"
+        warnings[k] = (f"{said}; rtol = {options.relative:g} allows less: take {how}",)
+    return {"error": largest.max(axis=1), "error_at_end": last.max(axis=1), "warnings": warnings}
 
-    def _errors(self, changes: Sequence[Array]) -> Array:
-        """Errors of components, (k, m), from differences between the first run and the second, and that and the third.
 
-        The law of the method holds where these, in the largest, have the ratio that goes with it, and where they have a
-        lower one as of another order. Across a kink it depends on where in a step that is: no ratio tells.
-        """
-        first = changes[0]
-        if len(changes) == 1:
-            return first * self._law.share
-        (ratio, share), least = self._law, min(LEAST_RATIO, self._law.ratio)
-        with np.errstate(all="ignore"):
-            measured = self._differences[1].largest / self._differences[0].largest
-        measured = np.where(np.isfinite(measured), np.clip(measured, least, ratio), least)
-        errors = np.where(first <= LAWLESS, first * share * (ratio - 1.0) / (measured - 1.0), first)
-        return np.where(self._bent[:, None], first, errors)
+def _errors(first: Array, measured: Array, law: Law, bent: Flags) -> Array:
+    """Errors of components, (k, m), from the first difference and by how much the second is larger.
+
+    The law of the method holds if these have the ratio that goes with it, and that of another order if it is lower.
+    Across a kink it depends on where in a step that is: no ratio tells.
+    """
+    if law.ratio == 1.0:
+        return first * law.share
+    least = min(LEAST_RATIO, law.ratio)
+    clipped = np.where(np.isfinite(measured), np.clip(measured, least, law.ratio), least)
+    by_law = first * law.share * (law.ratio - 1.0) / (clipped - 1.0)
+    return np.where((first <= LAWLESS) & ~bent[:, None], by_law, first)
 
 
 class RunEstimate:
-    """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them.
+    """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them."""
 
-    Runs beside have resets of their own. The forces of a controller answer the states of the run, and would be others
-    beside it: there each stretch of steps under the same forces is compared by itself, from where the run is.
-    """
-
-    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
-        self._run, self._x, self._options = run, x[None], options
-        self._estimator: Estimator | None = None
-        self._segment: FixedStepIntegration | None = None
-        self._stretch: EqualSteps | None = None
+    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
+        self._run, self._x, self._options = run, x, options
+        self._compared: _Whole | _Periods | None = None
         self.seconds = 0.0  # spent here
 
     def add(self, block: StepBlock) -> None:
         """The next steps of the run, or a reset."""
-        if not self._options.estimated:
+        if not self._options.estimated or not len(block.t):
             return
-        begin = time.perf_counter()
-        self._add(block)
+        begin, run = time.perf_counter(), self._run
+        assert isinstance(run, EqualStepper)
+        if self._compared is None:
+            p, program = np.array([run.parameters]), run.program
+            self._watch = Watch(program.rate, program.order, p, self._options.t0, self._x[None])
+            if run.control is None:
+                self._compared = _Whole(run, self._x, self._options)
+            else:
+                self._compared = _Periods(run, self._x, self._options.t0, self._watch)
+        if block.h[0] == 0.0:
+            self._watch.restart(float(block.t[0]), block.x)
+        else:
+            self._compared.add(block)
+            self._watch.add(block.t, block.x[None])
         self.seconds += time.perf_counter() - begin
-
-    def _add(self, block: StepBlock) -> None:
-        segment = self._run.segment
-        assert isinstance(segment, FixedStepIntegration)
-        controlled = segment.control is not None
-        if not len(block.t) or (controlled and block.h[0] == 0.0):
-            return
-        if self._estimator is None:
-            sparse = segment is self._run
-            p = np.array([segment.parameters])
-            self._estimator = Estimator(segment.program, self._options, p, self._beside, sparse=sparse)
-            self._estimator.begin(self._x, segment.stretches, shorter=controlled)
-        elif segment is not self._segment and not controlled:
-            self._estimator.segment(segment.stretches)
-        self._segment = segment
-        if controlled and segment.stretch is not self._stretch:
-            self._stretch = segment.stretch
-            self._estimator.restart(block.x_old[:1], segment.stretch, np.array([segment.parameters]))
-        self._estimator.add(States(block.t, block.x[None], 0 if controlled else self._run.resets))
 
     def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
         """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
-        if self._estimator is None:
+        if self._compared is None:
             return None, None, ()
-        begin = time.perf_counter()
-        (largest,), (last,), (warning,) = self._estimator.estimates()
+        begin, program = time.perf_counter(), self._run.program
+        law, compared = self._compared.comparison(self._run.largest, program.order)
+        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, compared)
+        error, last, said = [column[0] for column in columns.values()]
         self.seconds += time.perf_counter() - begin
-        if math.isnan(largest):  # nothing could be compared
-            return None, None, ()
-        return float(largest), float(last), (warning,) if warning else ()
+        return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
 
-    def _beside(self, course: Course, x: Array, p: Array) -> Iterator[States]:
-        """The states of a run on another course."""
-        run, segment = self._run, self._run.segment
-        assert isinstance(segment, FixedStepIntegration)
-        other: Integration = segment.beside(course.stretches, p[0].tolist())
-        if segment.control is None and run is not segment:  # with events
-            watched = cast("WatchedIntegration", run)
-            other = watched.beside(course.steps) if watched.resetting else other
-        for block in other.blocks(x[0]):
-            yield States(block.t, block.x[None], other.resets)
-            at, t = course.stretches[0].begin, float(block.t[-1])
-            if block.h[0] == 0.0 and abs(at - t) <= course.late:  # a reset, which the run had at another time
-                aside = segment.beside(equal_steps([t, at], course.longest), p[0].tolist()).blocks(block.x[-1])
-                for one in [block] if at == t else aside:
-                    if one.t[-1] == at:
-                        yield States(one.t[-1:], one.x[None, -1:], other.resets)
+
+class _Rows:
+    """States (T, m) of a run that starts with x, at instants t (T,), and how many resets it has had.
+
+    count: of the instants that it has come to; beyond the states are NaN.
+    """
+
+    def __init__(self, t: Array, x: Array) -> None:
+        self.t, self.x, self.resets, self.count = t, np.full((len(t), len(x)), math.nan), np.zeros(len(t)), 1
+        self.x[0], self._forth = x, np.sign(t[-1] - t[0])
+        self._times = self._forth * t - SAME_INSTANT * np.spacing(np.abs(t).max())  # for those at which steps end
+
+    def add(self, block: StepBlock, resets: int) -> None:
+        """The next steps, before which it had so many resets."""
+        ends = self._forth * block.t
+        here = slice(self.count, int(np.searchsorted(self._times, ends[-1], side="right")))
+        if block.dense is None:
+            self.x[here] = block.x[np.searchsorted(ends, self._times[here])]
+        else:
+            self.x[here] = block.at(self._forth * np.minimum(self._forth * self.t[here], ends[-1]))
+        self.resets[here], self.count = resets, max(self.count, here.stop)
+
+
+class _Whole:
+    """A run and runs beside it that go all the way, at instants at which steps of all end.
+
+    Runs with resets have these at other times, and are compared by their dense output where both have had as many.
+    """
+
+    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
+        self._run, self._x, stretches = run, x, equal_steps(options.instants, options.step)
+        self._resetting = run.log is not None and any([event.reset for event in run.log.program.events])
+        if self._resetting:
+            stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
+        self._beside = runs_beside(stretches, run.program.order)
+        self._rows = _Rows(self._beside.t, x)
+
+    def add(self, block: StepBlock) -> None:
+        """The next steps of the run."""
+        self._rows.add(block, self._run.resets)
+
+    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
+        """What the runs beside tell, after the last step."""
+        one, law = self._rows, self._beside.law
+        t = one.t[: one.count]
+        rows, alike = [one.x[None, : len(t)]], list[Flags]()
+        for stretches, _ in self._beside.runs if len(t) > 1 else ():
+            if self._resetting:
+                run = self._run.again(max([abs(part.h) for part in stretches]))
+            else:
+                run = self._run.beside(stretches, self._run.parameters)
+            other = _Rows(t, self._x)
+            for block in run.blocks(self._x * ASIDE):
+                if block.h[0] != 0.0:
+                    other.add(block, run.resets)
+                if other.count == len(t):
+                    break
+            if run.event:  # which has ended it before the other
+                other.resets[other.count :] = math.inf
+            rows.append(other.x[None])
+            alike.append(one.resets[: len(t)] == other.resets)
+            one = other
+        lost = _parting_time(t, alike[0], law.longest, self._run.resets) if alike else math.nan
+        return law, Comparison(t, rows, alike, lost)
+
+
+def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
+    """When runs with so many resets have other ones for longer than their steps explain; NaN if they have not."""
+    begins, ends = np.flatnonzero(np.diff(~alike, prepend=False, append=False)).reshape(-1, 2).T
+    late = max(LATE * longest, SHARE * abs(t[-1] - t[0]) / (1 + resets))
+    apart = np.flatnonzero((np.abs(t[ends - 1] - t[begins]) > late) | (2 * alike.sum() < len(t)))
+    return float(t[begins[apart[0]]]) if len(apart) else math.nan
+
+
+class _Periods:
+    """Differences of a run's stretches of steps under the same forces of a controller, each compared by itself.
+
+    These forces answer the states of the run, and would be others beside it: from where the run is, steps of half the
+    length are made under the same. The differences add up.
+    """
+
+    _stretch: EqualSteps  # of which so many steps are done
+
+    def __init__(self, run: EqualStepper, x: Array, t0: float, watch: Watch) -> None:
+        self._run = run
+        self._watch, self._t0, self._since, self._steps = watch, t0, math.inf, 0
+        self._size, self._sum = np.abs(x), np.zeros(len(x))
+
+    def add(self, block: StepBlock) -> None:
+        """The next steps of the run."""
+        if not self._steps or self._run.stretch is not self._stretch:
+            self._compare()
+            self._stretch, self._forces = self._run.stretch, self._run.parameters
+            self._start, self._steps = block.x_old[0], 0
+            self._watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
+        self._size = np.maximum(self._size, np.abs(block.x).max(axis=0))
+        self._steps, self._t, self._end = self._steps + len(block.t), float(block.t[-1]), block.x[-1]
+
+    def _compare(self) -> None:
+        """Add the difference of the stretch, as far as it went."""
+        if not self._steps:
+            return
+        begin, steps, end = self._stretch.begin, 2 * self._steps, self._start
+        run = self._run.beside([EqualSteps(begin, (self._t - begin) / steps, steps, self._t)], self._forces)
+        for block in run.blocks(self._start):
+            end = block.x[-1]
+        self._sum = self._sum + (math.nan if run.status else np.abs(end - self._end))
+        if not np.isfinite(self._sum).all():
+            self._since = min(self._since, self._t)
+
+    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
+        """What the differences tell, after the last step, as those of two rows."""
+        self._compare()
+        rows = [np.array([[self._size] * 2]), np.array([[self._size, self._size + self._sum]])]
+        return law_of_halves(longest, order), Comparison(np.array([self._t0, self._since]), rows)

@@ -11,8 +11,8 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..estimates.state_sizes import Flags
 from ..steps.dense_output import Indices, StepBlock
+from ..steps.state_sizes import Flags
 from .event import WatchedEvent
 
 CELLS = 8  # of a step before the first split, so that it is looked at sixteen times at least

@@ -16,8 +16,8 @@ from cgraph.extend import Builder, building, topological
 from ...equations.substitute import substitute
 from ...integrators import Problem, quantity, quantity_inputs, state_arguments
 from ...systems.arguments import call_user_function, new_variables, node_or_number, sequence
-from ..row_values import values_of
 from ..steps.dense_output import UNIT
+from ..steps.row_values import values_of
 
 ROUNDINGS = 8.0  # that the interpolation of a state, and the sum of a motion, may take
 

@@ -1,26 +1,20 @@
-"""EventLog: the events of a run, block by block, what they reset, and the run in segments between resets."""
+"""EventLog: the events of a run, block by block, and what they reset."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cgraph._shared import Array
 
 from ...integrators.step_control import RESOLUTION
-from ..estimates.state_sizes import Flags
-from ..row_values import converted, values_of
-from ..run_options import RunOptions
 from ..steps.dense_output import UNIT, StepBlock
-from ..steps.equal_steps import EqualSteps
-from ..steps.stepping import FixedStepIntegration, Integration
-from ..trajectory import Crossings
+from ..steps.row_values import values_of
+from ..steps.state_sizes import Flags
 from .crossings import MOST_CELLS, Crossing, Side, WatchedSteps, crossings
 from .event import EventProgram
 
@@ -88,6 +82,15 @@ class EventLog:
             self._see(part, len(part.t), part.x[-1])
             self._last = part.part(slice(-1, None))
         return block
+
+    def anew(self) -> EventLog:
+        """A log of the same events, before the first step."""
+        return EventLog(self.program)
+
+    @property
+    def resets(self) -> int:
+        """How many resets there were."""
+        return sum(self.program.events[number].reset is not None for number, _, _ in self.happened)
 
     def finish(self) -> None:
         """The run is at its end: what is zero there to the last bit has arrived."""
@@ -245,107 +248,3 @@ def _sides(look: _Look, own: Sequence[float] | Array) -> list[Side]:
         Side(value) if not zero else Side(motion, leaving=True) if motion else Side(float(side), resting=True)
         for zero, value, motion, side in signs
     ]
-
-
-def split_crossings(
-    program: EventProgram, happened: Sequence[Happening], nq: int, parameters: ArrayLike = 0.0
-) -> dict[str, Crossings]:
-    """Crossings by the event's name, from (number, t, x), with states split after nq numbers into q and qd."""
-    result = {}
-    for number, event in enumerate(program.events):
-        matching = [(t, x) for k, t, x in happened if k == number]
-        times = np.array([t for t, _ in matching])
-        states = np.array([x for _, x in matching]).reshape(len(matching), len(program.components))
-        states = converted(program.velocities, times, states, parameters)
-        result[event.name] = Crossings(times, states[:, :nq], states[:, nq:])
-    return result
-
-
-class WatchedIntegration(Integration):
-    """A run with events, in segments: each starts where the options say, or from the state that a reset leaves.
-
-    segment: makes the integration of a segment from its options.
-    """
-
-    def __init__(
-        self, segment: Callable[[RunOptions], Integration], options: RunOptions, program: EventProgram
-    ) -> None:
-        super().__init__(program.components)
-        self._make, self.options, self.log = segment, options, EventLog(program)
-        self._segments: list[Integration] = []
-
-    @property
-    def segment(self) -> Integration:
-        """The part of the run that it is in: what makes its steps since the last reset."""
-        return self._segments[-1]
-
-    @property
-    def resetting(self) -> bool:
-        """Whether there are events that reset the state."""
-        return self.log.resetting
-
-    def beside(self, steps: Callable[[float], Sequence[EqualSteps]]) -> WatchedIntegration:
-        """Run with other equal steps: those of a segment from the time on at which it begins."""
-        first, options = self._segments[0], replace(self.options, max_steps=math.inf)
-        assert isinstance(first, FixedStepIntegration)
-        return WatchedIntegration(
-            lambda segment: first.beside(steps(segment.t0), first.parameters), options, self.log.program
-        )
-
-    def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
-        """Crossings by the event's name, with states split after nq numbers; parameters: of the problem."""
-        return split_crossings(self.log.program, self.log.happened, nq, parameters)
-
-    def blocks(self, x: Array) -> Iterator[StepBlock]:
-        """The steps from x (m,) on, some at a time. A reset is a step of no length."""
-        options, log = self.options, self.log
-        while True:
-            yield from self._segment(options, x)
-            if self.status or log.restart is None:
-                return
-            (t, before, x), log.restart = log.restart, None
-            self.resets = sum(log.program.events[number].reset is not None for number, _, _ in log.happened)
-            instant = np.array([t])
-            yield StepBlock(instant, x[None], instant, np.zeros(1), before[None], np.zeros((1, 1, len(x))))
-            if self.event or t == options.t_end:
-                return
-            options = self._rest(t)
-
-    def _segment(self, options: RunOptions, x: Array) -> Iterator[StepBlock]:
-        """The steps up to an event after which the run does not go on as it did, or to the end."""
-        run, log, last = self._make(options), self.log, options.t0
-        self._segments.append(run)
-        for block in run.blocks(x):
-            log.parameters = run.parameters
-            kept = log(run.with_dense(block))
-            self.steps += len(kept.t)
-            self._count(run)
-            if len(kept.t):
-                last = float(kept.t[-1])
-                yield kept
-            if log.ended or log.restart is not None:
-                break
-        else:
-            self._count(run)
-            self.status = run.status
-            if run.status and self.steps + self.rejected >= self.options.max_steps:
-                self.status = self.too_many(last, self.options.max_steps)
-            if not run.status:
-                log.finish()
-        self.status, self.event = log.status or self.status, log.ended
-
-    def _count(self, run: Integration) -> None:
-        for name in ("rejected", "evaluations", "jacobians", "factorizations"):
-            setattr(self, name, sum([getattr(segment, name) for segment in self._segments]))
-        self.prices, self.slope = run.prices, run.slope
-        self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
-        self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.said.values()]))
-
-    def _rest(self, t: float) -> RunOptions:
-        """The options of the rest of the run from t on, whose first step is chosen anew."""
-        options, times = self.options, self.options.times
-        if times is not None:
-            ahead = times[(times - t) * options.direction > 0.0]
-            times = ahead if len(ahead) else np.array([options.t_end])
-        left = max(1.0, options.max_steps - self.steps - self.rejected)
-        return replace(options, t0=t, t_eval=times, first_step=None, max_steps=left)

@@ -1,11 +1,12 @@
-"""Gradients of motions: a loss of where a motion ends and of how it goes, differentiated by the discrete adjoint."""
+"""Gradients of motions, one or many: losses of where they end and how they go, by the discrete adjoint."""
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,39 +14,40 @@ from numpy.typing import ArrayLike
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import Array, kept_by_first, memo
-from cgraph.extend import Builder, topological
+from cgraph.extend import topological
 
 from ...integrators import Problem, quantity
-from ...systems.arguments import Parameters, call_user_function
-from ...systems.model import Model, as_equations
-from ...systems.ode_system import OdeSystem
-from ...systems.system import System
+from ...systems.model import Model
+from ..applied_force import Constant
 from ..events.event import Event, as_events
-from ..moving import Constant
+from ..outcome import MotionError
+from ..run_options import Options
 from ..trajectory import SimulationWarning
+from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
-from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
-from .motion_equations import at
-from .segments import Bars, MotionSegments, segments_of
+from .motion_programs import at
+from .motions import TORQUE, Loss, Motions, motions_of
 
-Loss = Callable[..., Node | float]
 LOSSES_KEPT = 64  # losses whose graphs stay for another run
+FEW_MOTIONS = 4  # motions: fewer by a method that iterates are done sooner one by one
+WIDE_BLOCK = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
 
 
 @dataclass(frozen=True, eq=False)
 class MotionGradient:
-    """The value of a loss of a motion, and its gradient.
+    """The value of a loss of a motion, and its gradient; or of N motions, arrays with an axis of N first.
 
     Attributes
     ----------
     value : float
-        The loss.
+        The loss; of N motions (N,), NaN as all else of one that does not stay finite or does not reach its end.
     gradients : dict of str to ndarray or float
         By the names of `wrt`: "q" and "qd" (n,), of an OdeSystem "q" (m,); "tau" (n,), or (steps, n) where tau has a
         row a step; of a parameter a number. Where velocities are no rates of coordinates, as of quaternions, "q" is by
         small displacements xi, dq = G(q) xi, (n,).
     t : ndarray, (steps + 1,)
-        Where the steps begin, and the last one ends [s].
+        Where the steps begin, and the last one ends [s]. Of N motions in chosen steps, which each has for itself, start
+        and end alone, (2,).
     q, qd : ndarray, (nq,) and (n,)
         Where the motion ends; of an OdeSystem q is its state and qd is empty.
     checkpoints : int
@@ -60,7 +62,7 @@ class MotionGradient:
     (['q', 'qd', 'tau'], [0.0, 0.05, 0.1], 0)
     """
 
-    value: float
+    value: Any
     gradients: dict[str, Any]
     t: Array
     q: Array
@@ -82,19 +84,10 @@ def gradient(
     *,
     running: Loss | None = None,
     wrt: str | Iterable[str] | None = None,
-    t0: float = 0.0,
-    t_span: ArrayLike | None = None,
-    dt: float | None = None,
-    max_step: float | None = None,
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
-    first_step: float | None = None,
     tau: Constant | ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
     events: Event | Iterable[Event] = (),
-    estimate_error: bool | None = None,
-    backend: str = "auto",
-    form: str = "velocity",
+    **options: Unpack[Options],
 ) -> MotionGradient:
     """A loss of a motion and its gradient, by reverse mode through every step, in a few times the motion itself.
 
@@ -112,7 +105,7 @@ def gradient(
     loss : callable, optional
         (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node or a number; of an OdeSystem
         (x, t) or (x, t, p). None for a running loss alone.
-    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, backend, form
+    q, qd, t_end
         As for `simulate`.
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those of a controller, as for `simulate`; and of those that
@@ -133,10 +126,9 @@ def gradient(
         Those of `simulate`: where one ends the motion or resets its state depends on all before, and so do the steps
         after it. The motion arrives there by a step of its own length, where `simulate` reads the state off its dense
         output: `value` may differ from that of its run by the error of a step. Not with a row of forces a step.
-    estimate_error : bool, optional
-        Of equal steps, whether a motion in steps of half the length estimates the error of the state, with a
-        `SimulationWarning` where it is beyond `rtol`, 1e-3, and `atol`, 0; which takes half as long again. By
-        default it does. The numbers are the same without.
+    **options
+        Those of `dyn.Options` but `max_steps`, `dense_output`, `fma` and `progress`. The error of equal steps is
+        estimated by a motion in steps of half the length, which takes half as long again.
 
     Returns
     -------
@@ -163,96 +155,132 @@ def gradient(
     >>> round(result.value, 6), result["q"].round(6).tolist(), result["tau"].shape
     (-0.403412, [-0.880376], (100, 1))
     """
-    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
-    options |= {"estimate_error": estimate_error, "backend": backend}
-    span, watched = (t_end, t0, t_span), as_events(events)
-    model = with_loss_parameters(model, parameters, loss, running)
-    motion = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, watched, **options)
-    values, slopes, segments, ends = differentiated(motion, loss, running, watched)
-    for text in doubts(segments, values, slopes, ends)[0]:
+    losses = loss, running
+    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, as_events(events), losses, options)
+    run, values, slopes, bars = differentiated(motions, *losses)
+    for text in doubts(run, values, slopes, bars)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    nq, x, checkpoints = motion.problem.nq, segments.end[:, 0], max([run.tape.checkpoints for run in segments.runs])
+    nq, x = motions.problem.nq, run.end[:, 0]
     gradients = {name: each[..., 0] if each.ndim > 1 else float(each[0]) for name, each in slopes.items()}
-    return MotionGradient(float(values[0]), gradients, segments.t, x[:nq], x[nq:], checkpoints)
-
-
-def with_loss_parameters(model: Model, parameters: object, loss: Loss | None, running: Loss | None) -> Model:
-    """The model, with those given parameters that it has not and a loss reads: inputs that its equations do not use."""
-    own = as_equations(model)
-    given = parameters if isinstance(parameters, Mapping) else {}
-    new = [name for name in given if name not in own.parameters]
-    if not new or not all([isinstance(name, str) for name in new]):
-        return model
-    p, t, system = Parameters([*own.parameters, *new]), cg.variable("t"), own.system
-    state = [cg.variables(list(own.coordinates))] if system is None else [system.q, system.qd]
-    force = [] if system is None else [list(system.tau)]
-    called = [("loss", loss, state), ("running", running, [*state, *force])]
-    read = [call_user_function(what, each, *at, t, p) for what, each, at in called if each is not None]
-    used = {node.name for node in topological([node for node in read if isinstance(node, Node)])}
-    extended = dict(own.parameters) | {name: 0.0 for name in new if name in used}
-    if system is not None:
-        return system.changed(parameters=extended)
-    ode = own.ode
-    assert ode is not None
-    return OdeSystem(lambda x, t: ode.rates, ode.states, extended)
+    return MotionGradient(float(values[0]), gradients, run.t, x[:nq], x[nq:], run.checkpoints)
 
 
 def differentiated(
-    motion: MotionRequest, loss: Loss | None, running: Loss | None, watched: Sequence[Event] = ()
-) -> tuple[Array, dict[str, Array], MotionSegments, tuple[Array, Array]]:
-    """Losses (N,) of motions, their gradients (.., N) by names, the motions, and the losses' slopes by both ends."""
-    problem = motion.problem
+    motions: Motions, loss: Loss | None, running: Loss | None
+) -> tuple[DifferentiatedRun, Array, dict[str, Array], tuple[Array, Array]]:
+    """The run of motions, losses (N,), their gradients (.., N) by names, and their slopes by start and end, (m, N)."""
+    problem, equations = motions.problem, motions.equations
     if loss is None and running is None:
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
     final = None if loss is None else loss_graph(problem, quantity(problem, "loss", loss, constant=True))
     total = None
     if running is not None:
-        total = loss_graph(problem, quantity(problem, "running", running, motion.applied, constant=True))
-    segments = segments_of(motion, watched, total, forwards=False)
-    values, end = _final(final, motion, segments)
-    start, inputs, rows = segments.pulled(end)
-    return values + segments.loss, _gradients(motion, start, inputs, rows, end), segments, (start, end.x)
+        total = loss_graph(problem, quantity(problem, "running", running, motions.applied, constant=True))
+    run = DifferentiatedRun(motions, total)
+    point = run.motions.point(run.x, float(run.t[-1]))
+    value, *slopes = (
+        np.zeros_like(point[:1]) if final is None else at(with_slopes(final, motions.options.backend), point)
+    )
+    end = np.array(slopes) if slopes else np.zeros_like(point)
+    start, rows = run.pulled(end)
+    gradients = motions.by_names(start)
+    if motions.each_step and TORQUE in gradients:
+        rows[-1] += end[problem.size + 1 :][: equations.forces]  # what the final loss has of the force itself
+        gradients[TORQUE] = rows
+    return run, value + run.loss, gradients, (start[: problem.size], end[: problem.size])
 
 
-def _final(graph: Graph | None, motion: MotionRequest, segments: MotionSegments) -> tuple[Array, Bars]:
-    """The final losses, (N,), and their slopes."""
-    m, many = segments.x.shape
-    if graph is None:
-        inputs = np.zeros((motion.forces + len(motion.values), many))
-        return np.zeros(many), Bars(np.zeros_like(segments.x), np.zeros(many), inputs)
-    values = at(with_slopes(graph, motion.backend), motion.at_end(segments.x, float(segments.t[-1])))
-    return values[0], Bars(values[1 : m + 1], values[m + 1], values[m + 2 :])
+def gradient_many(
+    model: Model,
+    loss: Loss | None,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    t_end: float | None = None,
+    method: str | None = None,
+    *,
+    running: Loss | None = None,
+    wrt: str | Iterable[str] | None = None,
+    tau: ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    **options: Unpack[Options],
+) -> MotionGradient:
+    """Losses of N motions and their gradients, each by its own start, forces and parameters: `gradient`, N times.
 
+    Motions in equal steps go side by side, a vector of them at a time; those that choose their steps go one by one, as
+    do fewer than four by a method that iterates. One that does not stay finite, whose equations are not solved, or
+    which does not reach its end, is NaN, and a `SimulationWarning` says how many are, and of the first when and why.
 
-def _gradients(motion: MotionRequest, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Array]:
-    """Gradients by the names of `wrt`, of cotangents of the start, of the inputs, and of the forces of each step."""
-    nq, forces, equations = motion.problem.nq, motion.forces, motion.equations
-    result: dict[str, Array] = {}
-    if motion.by_parameters:
-        p = motion.values[: len(equations.names)]
-        result = dict(zip(equations.names, equations.by_parameters(p, inputs[forces:], motion.backend), strict=True))
-    if TORQUE in motion.wrt:
-        if motion.each_step:
-            rows[-1] += end.inputs[:forces]  # what the final loss has of the force itself
-        result[TORQUE] = rows if motion.each_step else inputs[:forces]
-    result |= {START: _displaced(motion, start), VELOCITY: start[nq:]}
-    return {name: result[name] for name in motion.wrt}
+    Parameters
+    ----------
+    model : System, OdeSystem, Mechanism or Scene
+        What moves.
+    q, qd : array_like
+        The starts, (N, nq) and (N, n), or (nq,) and (n,) for all; of an OdeSystem q is the state, and qd None.
+    loss, t_end, running, wrt, **options
+        As for `gradient`.
+    method : str, optional
+        As for `gradient`: "dop853", and "rk4" where `dt` or a row of forces a step asks for equal steps.
+    tau : float, array_like or callable
+        Applied force [N m or N]: constant, (n,) or (N, n); a row a step, (N, steps, n); or a controller in closed form.
+    parameters : mapping, optional
+        As for `gradient`, a number for all or one for each motion, (N,).
 
+    Returns
+    -------
+    MotionGradient
+        `value`, (N,), and the gradients by each name of `wrt`, with an axis of N first.
 
-def _displaced(motion: MotionRequest, bar: Array) -> Array:
-    """The cotangent of the coordinates; of quasi-velocities by displacements, G^T q_bar."""
-    system, nq = motion.problem.system, motion.problem.nq
-    if system is None or system.kinematics.quasi is None or START not in motion.wrt:
-        return bar[:nq]
-    return at(_by_displacements(system, motion.backend), np.concatenate([motion.x[:nq], bar[:nq]]))
+    Raises
+    ------
+    TypeError, ValueError, SingularMassMatrixError
+        As `gradient` does.
 
-
-@kept_by_first
-def _by_displacements(system: System, backend: str) -> Any:
-    """(q, q_bar) -> G^T q_bar as a function."""
-    bars = cg.variables([f"bar{k}" for k in range(system.nq)])
-    pulled = system.kinematics.pulled_back(bars, Builder())
-    return cg.compile(Graph([*system.q, *bars], {f"{k}": node for k, node in enumerate(pulled)}), backend)
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0], [1.0])
+    >>> fan = dyn.gradient_many(arm, lambda q, qd, t: q[0], [[0.5], [1.0], [2.0]], [0.0], t_end=1.0, wrt="q")
+    >>> fan["q"].round(4).tolist(), fan.value.shape
+    ([[-0.8804], [-1.1123], [-0.595]], (3,))
+    """
+    losses = loss, running
+    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, (), losses, options, many=True)
+    count, problem, run_options = motions.many, motions.problem, motions.options
+    value, end, checkpoints = np.full(count, np.nan), np.full((count, problem.size), np.nan), 0
+    by_name = {name: each.T.copy() for name, each in motions.by_names(np.full_like(motions.point(), np.nan)).items()}
+    if motions.each_step and TORQUE in by_name:
+        by_name[TORQUE] = np.full((count, *motions.tau.shape[:-1]), np.nan)
+    # one by one, or side by side, of which a last one goes with those before it
+    alone = run_options.adaptive or (count < FEW_MOTIONS and run_options.integrator.step(problem).iterates)
+    begins = [*(range(count) if alone else range(0, max(1, count - 1), WIDE_BLOCK)), count]
+    early, said, parts = dict[int, str](), dict[int, str](), [range(*ends) for ends in itertools.pairwise(begins)]
+    for part in parts:
+        try:
+            run, losses_of_part, slopes, bars = differentiated(motions.of(slice(part.start, part.stop)), *losses)
+        except MotionError as error:
+            if len(part) == 1:
+                early[part[0]] = str(error)
+            else:  # one of them has no derivative
+                parts += [range(k, k + 1) for k in part]
+            continue
+        checkpoints = max(checkpoints, run.checkpoints)
+        arrived = np.asarray(np.isfinite(run.end).all(axis=0))
+        rows = part.start + np.flatnonzero(arrived)
+        results = [(value, losses_of_part), (end, run.end), *[(by_name[name], slopes[name]) for name in slopes]]
+        for table, array in results:
+            table[rows] = np.moveaxis(array, -1, 0)[arrived]
+        for number, whole, sentences in zip(part, arrived, doubts(run, losses_of_part, slopes, bars), strict=True):
+            if not whole:
+                early[number] = f"the motion {run.stopped(number - part[0], run.segments[0])}"
+            elif sentences:
+                said[number] = sentences[0]
+    for each, what in ((early, "stopped early"), (said, "doubtful")):
+        if each:
+            first, text = min(each.items())
+            text = f"{len(each)} of {count} motions {what}: motion {first}: {text}"
+            warnings.warn(text, SimulationWarning, stacklevel=2)
+    t = motions.steps[0].t.copy() if motions.steps else np.array([run_options.t0, run_options.t_end])
+    return MotionGradient(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :], checkpoints)
 
 
 @dataclass(frozen=True)

@@ -1,24 +1,31 @@
-"""Motion programs: the start and the steps of a motion, with its running loss, and their derivatives, compiled once."""
+"""Motion programs: the start and the steps of a motion, with its running loss, and their derivatives, compiled once.
+
+The parameters of a problem are taken apart for them: applied forces, p, and numbers c, which p alone decides.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph._shared import Linearization, Linearized, memo
-from cgraph.extend import STATEMENTS, Call, Map, Program, Runner, Statement, runner
+from cgraph import Graph, Node
+from cgraph._shared import TURNS, Along, Array, Passes, adjoint, kept_by_first, memo, tangent
+from cgraph.extend import STATEMENTS, Builder, Call, Map, Program, Statement, folded, topological
 
-from ...integrators import Method, Step
+from ...equations.substitute import substitute
+from ...integrators import Method, Problem
 from ...integrators.method import equal_registers
 from ...integrators.step import with_registers
 from ...systems.arguments import TIME, new_variables
 from ..steps.step_program import normalizing
-from .motion_equations import PARAMETERS, MotionEquations, sharing
+from .rate_pullback import RatePullback, rate_pullback, sharing
 
+PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
 LOSS = "loss"  # register: the running loss so far
 GIVEN = (*PARAMETERS, "t", "rtol", "atol")  # registers: what a motion has from without
 PROGRAMS_KEPT = 16  # motions whose programs stay ready for another run
@@ -27,17 +34,116 @@ _LATER = Graph([_T, _H], {"t": _T + _H})
 
 
 @dataclass(frozen=True, eq=False)
-class WithDerivative:
-    """Passes and what goes along them: the passes themselves, and their linearization, compiled."""
+class MotionEquations:
+    """A problem whose parameters are applied forces, p, and numbers c, which p alone decides.
 
-    passes: Linearization
-    forward: Runner
-    linear: Linearized
-    derivative: Runner
+    given: the one without c.  forces: how many of the parameters are applied forces.  names: of p.
+    numbers: p and c, a graph over p; none where there is no c.  pullback: of the rate, where there is one.
+    start, end: (q, qd) to a state of the steps and back, over states, t, parameters; None where they are the same.
+    """
+
+    given: Problem
+    problem: Problem
+    forces: int
+    names: tuple[str, ...]
+    numbers: Graph | None
+    pullback: RatePullback | None
+    start: Graph | None
+    end: Graph | None
+
+    @property
+    def lengths(self) -> dict[str, int]:
+        """Lengths of the registers of the parameters."""
+        count = len(self.problem.parameters) - self.forces - len(self.names)
+        return dict(zip(PARAMETERS, (self.forces, len(self.names), count), strict=True))
+
+    def registers(self, inputs: Array) -> dict[str, Array]:
+        """The registers of the parameters, of these end to end."""
+        p = self.forces + len(self.names)
+        return dict(zip(PARAMETERS, (inputs[: self.forces], inputs[self.forces : p], inputs[p:]), strict=True))
+
+    def values(self, p: Array, backend: str) -> Array:
+        """p and c, (P + C, N), from p (P, N)."""
+        return p if self.numbers is None else at(compiled(self.numbers, backend), p)
+
+    def by_parameters(self, p: Array, bars: Array, backend: str) -> Array:
+        """Cotangents of p from those of p and c."""
+        return bars if self.numbers is None else at(pulled_back(self.numbers, backend), np.concatenate([p, bars]))
 
 
-@dataclass(frozen=True, eq=False)
-class MotionPrograms:
+@kept_by_first
+def motion_equations(problem: Problem, forces: int) -> MotionEquations:
+    """The equations of a problem whose first `forces` parameters are applied forces."""
+    names, pullback = problem.parameters[forces:], rate_pullback(problem)
+    graphs = [problem.rate] if problem.projection is None else [problem.rate, problem.projection]
+    parts = [node for graph in graphs for node in graph.outputs.values()]
+    if pullback is not None:
+        parts += [pullback.power, *pullback.solved, *pullback.q_dot]
+    p = cg.variables(list(names))
+    numbers, changed = _apart(parts, p, problem.rate.input_names)
+    new = dict(zip(parts, changed, strict=True))
+    rate, *projection = [
+        Graph([*graph.inputs, *numbers], {name: new[node] for name, node in graph.outputs.items()}) for graph in graphs
+    ]
+    if pullback is not None:
+        solved, q_dot = ([new[node] for node in nodes] for nodes in (pullback.solved, pullback.q_dot))
+        pullback = replace(pullback, inputs=rate.inputs, power=new[pullback.power], solved=solved, q_dot=q_dot)
+    outputs = {str(variable.name): node for variable, node in numbers.items()}
+    parameters, projected = (*problem.parameters, *outputs), projection[0] if projection else None
+    made = replace(problem, parameters=parameters, rate=rate, projection=projected, multipliers=None)
+    over_p = Graph(p, dict(zip(names, p, strict=True)) | outputs) if outputs else None
+    ways = _whole(made, made.momentum), _whole(made, made.velocities)
+    return MotionEquations(problem, made, forces, names, over_p, pullback, *ways)
+
+
+def _whole(problem: Problem, last: Graph | None) -> Graph | None:
+    """States to states, whose coordinates stay and whose last numbers a graph gives."""
+    if last is None:
+        return None
+    q = {str(node.name): node for node in last.inputs[: problem.nq]}
+    return problem.bind(last.input_names[: problem.size], Graph(last.inputs, q | last.outputs))
+
+
+def _apart(
+    nodes: Sequence[Node], parameters: Sequence[Node], taken: Sequence[str]
+) -> tuple[dict[Node, Node], list[Node]]:
+    """{variable c: what it is of the parameters alone, where others use it}, and the nodes over these variables.
+
+    taken: names that the variables do not get.
+    """
+    build = Builder()
+    copies = folded(nodes, build)
+    order = topological(copies)
+    alone, edge = set(parameters), dict.fromkeys(copies)
+    for node in order:
+        if node.args and all([arg in alone or arg.op.name == "constant" for arg in node.args]):
+            alone.add(node)
+        else:
+            edge |= dict.fromkeys(node.args)
+    used = [node for node in edge if node in alone]
+    numbers = dict(zip(used, new_variables("number", len(used), taken), strict=True))
+    return {variable: node for node, variable in numbers.items()}, substitute(copies, numbers)
+
+
+@kept_by_first
+def compiled(graph: Graph, backend: str) -> Any:
+    """The graph as a function."""
+    return cg.compile(graph, backend)
+
+
+@kept_by_first
+def pulled_back(graph: Graph, backend: str) -> Any:
+    """J^T y_bar as a function of the inputs, then y_bar."""
+    return cg.compile(cg.simplify(cg.vjp(graph)), backend)
+
+
+def at(function: Any, x: Array) -> Array:
+    """The outputs, (k, N), at points (n, N)."""
+    values: Array = function(x[:, 0])[:, None] if x.shape[1] == 1 else function.batch(x)
+    return values
+
+
+class MotionPrograms(NamedTuple):
     """The programs of a motion.
 
     start: from x to what the first step reads; None where that is x.
@@ -45,76 +151,66 @@ class MotionPrograms:
     failed: a register that is not 0 after steps whose equations were not solved; empty where there is none.
     """
 
-    start: WithDerivative | None
-    step: WithDerivative
+    start: Along | None
+    step: Along
     failed: str
 
 
-@dataclass(frozen=True)
-class ProgramRequest:
-    """Request for the programs of a motion.
-
-    each_step: whether the applied forces are new in every step.  wrt: among "tau", "p", "c", "h" and "t", besides the
-    state.  forwards: tangents are pushed on, else cotangents pulled back.  many: motions go side by side.
-    running: the loss of a step, a graph over the states, t and parameters.
-    """
-
-    equations: MotionEquations
-    method: Method
-    each_step: bool
-    wrt: tuple[str, ...]
-    forwards: bool
-    backend: str
-    many: bool = False
-    running: Graph | None = None
-
-
 @memo(PROGRAMS_KEPT)
-def motion_programs(request: ProgramRequest) -> MotionPrograms:
-    """The programs; of the last few requests, those made before."""
-    made = request.method.step(request.equations.problem)
-    (step, start), first = _linearizations(request, made), None
-    if request.forwards:
-        then = [Map(_LATER, ("t:dot", "h:dot"), ("t:dot",))] if {"t", "h"} <= set(step.wrt) else []
-        linear = step.tangent(step.wrt, ["x"], then)
-    else:
-        linear = step.adjoint(["x", LOSS] if LOSS in step.handed else ["x"])
-    if start is not None:
-        seeds = [name for name in linear.vectors if name in start.handed]
-        pass_on = start.tangent(start.wrt, ["x"]) if request.forwards else start.adjoint(seeds)
-        first = _with_derivative(start, pass_on, list(start.handed), request.backend)
-    results = [name for name in ("x", LOSS, made.failed) if name in step.handed]
-    return MotionPrograms(first, _with_derivative(step, linear, results, request.backend), made.failed)
+def motion_programs(
+    equations: MotionEquations,
+    method: Method,
+    wrt: tuple[str, ...],
+    running: Graph | None,
+    backend: str,
+    *,
+    each_step: bool,
+    forwards: bool,
+    many: bool,
+) -> MotionPrograms:
+    """The programs; of the last few motions, those made before.
 
-
-def _with_derivative(passes: Linearization, linear: Linearized, results: list[str], backend: str) -> WithDerivative:
-    forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
-    return WithDerivative(passes, runner(forward, backend), linear, runner(linear.program, backend))
-
-
-def _linearizations(request: ProgramRequest, made: Step) -> tuple[Linearization, Linearization | None]:
-    """Linearizations of a step with its running loss, and of the statements before the first step."""
-    equations, problem, running = request.equations, request.equations.problem, request.running
+    wrt: among "tau", "p", "c", "h" and "t", besides the state.  running: the loss of a step, over the states, t and
+    parameters.  each_step: whether the applied forces are new in every step.  forwards: tangents are pushed on, else
+    cotangents pulled back.  many: motions go side by side.
+    """
+    problem, made = equations.problem, method.step(equations.problem)
     lengths = with_registers(made, {**equal_registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
     body: list[Statement] = list(made.derived)
     if arrived := normalizing(problem, "arrival"):
         body += [Call(_LATER, ("t", "h"), ("arrival",)), *arrived]
-    carried = ["x"]
+    carried = ["x"] if running is None else ["x", LOSS]
     if running is not None:
         (before,) = new_variables(LOSS, 1, running.input_names)
         total = Graph([*running.inputs, before], {LOSS: running.only_output() + before})
         body.insert(0, Call(total, ("x", "t", "p", LOSS), (LOSS,)))
-        carried.append(LOSS)
-    pullbacks = {} if equations.pullback is None else {id(problem.rate): equations.pullback}
-    if not request.forwards and not request.many and (both := sharing(equations)) is not None:
-        body = _sharing(body, problem.rate, both[0], lengths)
-        pullbacks[id(both[0])] = both[1]
-    make = partial(Linearization, constant=(*made.fixed, "evaluations", "nonfinite"), rules=pullbacks)
-    fed = ("t", "h", "tau") if request.each_step else ("t", "h")
-    step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, request.wrt)
-    read = [name for name in (*step.handed, *step.constants) if name not in GIVEN]
-    begin, wrt = _separate([*normalizing(problem, TIME), *made.start]), [name for name in request.wrt if name != "h"]
-    return step, make(Program(lengths, begin, record=()), read, wrt) if begin else None
+    rate, rule = problem.rate, equations.pullback
+    rules = {} if rule is None else {id(rate): (problem.size, rule)}
+    if rule is not None and not forwards and not many:  # calls of the rate record what the pullback shares with it
+        shared, pullback = sharing(rate, rule)
+        rules[id(shared)] = problem.size, pullback
+        for k, each in enumerate(body):
+            if isinstance(each, Call) and each.graph is rate:
+                lengths[f"shared{k}"] = len(shared.outputs) - len(rate.outputs)
+                body[k] = Call(shared, each.inputs, (*each.outputs, f"shared{k}"))
+    constant, turns = (*made.fixed, "evaluations", "nonfinite"), 0 if forwards else TURNS
+    make = partial(Passes, constant=constant, turns=turns)
+    fed = ("t", "h", "tau") if each_step else ("t", "h")
+    step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, wrt)
+    if forwards:
+        then = [Map(_LATER, ("t:dot", "h:dot"), ("t:dot",))] if {"t", "h"} <= set(wrt) else []
+        linear = tangent(step, ["x"], then)
+    else:
+        linear = adjoint(step, carried, rules)
+    first = None
+    if begin := _separate([*normalizing(problem, TIME), *made.start]):
+        read = [name for name in (*step.handed, *step.constants) if name not in GIVEN]
+        start = make(Program(lengths, begin, record=()), read, [name for name in wrt if name != "h"])
+        seeds = [name for name in linear.vectors if name in start.handed]
+        first = Along(start, tangent(start, ["x"]) if forwards else adjoint(start, seeds, rules), read, backend)
+    results = [name for name in ("x", LOSS, made.failed) if name in step.handed]
+    rows = [step.handed[name] for name in (made.failed, "x") if name in step.handed]
+    return MotionPrograms(first, Along(step, linear, results, backend, rows), made.failed)
 
 
 def _separate(statements: Sequence[Statement]) -> list[Statement]:
@@ -129,16 +225,4 @@ def _separate(statements: Sequence[Statement]) -> list[Statement]:
                 parts = [PARAMETERS if each == "p" else (each,) for each in registers]
                 changed[name] = tuple([each for part in parts for each in part])
         result.append(replace(statement, **changed) if changed else statement)  # type: ignore[type-var]
-    return result
-
-
-def _sharing(body: list[Statement], rate: Graph, sharing_rate: Graph, lengths: dict[str, int]) -> list[Statement]:
-    """The statements, of which those that call the rate record what its pullback shares with it."""
-    result: list[Statement] = []
-    for k, statement in enumerate(body):
-        if isinstance(statement, Call) and statement.graph is rate:
-            register = f"shared{k}"
-            lengths[register] = len(sharing_rate.outputs) - len(statement.graph.outputs)
-            statement = Call(sharing_rate, statement.inputs, (*statement.outputs, register))
-        result.append(statement)
     return result

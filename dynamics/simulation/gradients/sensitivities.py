@@ -5,23 +5,22 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph._shared import Array
 
 from ...systems.model import Model
+from ..applied_force import Constant
 from ..events.event import Event, as_events
-from ..moving import Constant
-from ..row_values import values_of
+from ..run_options import Options
 from ..trajectory import SimulationWarning
+from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
-from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
-from .segments import segments_of
+from .motions import motions_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,19 +69,10 @@ def sensitivities(
     method: str | None = None,
     *,
     wrt: str | Iterable[str] | None = None,
-    t0: float = 0.0,
-    t_span: ArrayLike | None = None,
-    dt: float | None = None,
-    max_step: float | None = None,
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
-    first_step: float | None = None,
     tau: Constant | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
     events: Event | Iterable[Event] = (),
-    estimate_error: bool | None = None,
-    backend: str = "auto",
-    form: str = "velocity",
+    **options: Unpack[Options],
 ) -> Sensitivities:
     """A motion and the derivatives of all its states, by forward mode through every step.
 
@@ -93,9 +83,9 @@ def sensitivities(
     ----------
     model : System, OdeSystem, Mechanism or Scene
         What moves.
-    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend, form
+    q, qd, t_end, parameters
         As for `simulate`.
-    method, estimate_error
+    method, **options
         As for `gradient`.
     wrt : str or sequence of str, optional
         What to differentiate by: "q", "qd", "tau" and names of parameters. By default the start and the applied force.
@@ -124,50 +114,19 @@ def sensitivities(
     >>> result["m"][[100, 200]].round(4).tolist()
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
-    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
-    options |= {"estimate_error": estimate_error, "backend": backend}
-    span, watched = (t_end, t0, t_span), as_events(events)
-    motion = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, watched, **options)
-    if motion.each_step:
-        raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape[:-1]}: gradient takes a row a step")
-    directions, columns = _directions(motion)
-    segments = segments_of(motion, watched, forwards=True)
-    for text in doubts(segments, np.zeros(1), {})[0]:
+    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, as_events(events), (None, None), options)
+    if motions.each_step:
+        raise ValueError(f"tau must be constant, (n,), got shape {motions.tau.shape[:-1]}: gradient takes a row a step")
+    run = DifferentiatedRun(motions, forwards=True)
+    for text in doubts(run)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    t, x, t_dot, x_dot = segments.tangents(directions)
+    # a column for each number of `wrt`: the transpose of how cotangents of it are made of those of x, t and inputs
+    units = np.eye(len(motions.point()))
+    by = {name: np.atleast_2d(rows) for name, rows in motions.of([0] * len(units)).by_names(units).items()}
+    t, x, t_dot, x_dot = run.pushed(np.concatenate([*by.values()]).T)
+    ends, nq = np.cumsum([len(rows) for rows in by.values()]), motions.problem.nq
+    columns: dict[str, Any] = {name: slice(end - len(by[name]), end) for name, end in zip(by, ends, strict=True)}
+    columns |= {name: end - 1 for name, end in zip(by, ends, strict=True) if name in motions.equations.names}
     derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
     times = {name: t_dot[:, place] for name, place in columns.items()}
-    nq = motion.problem.nq
     return Sensitivities(t, x[:, :nq], x[:, nq:], derivatives, times)
-
-
-def _directions(motion: MotionRequest) -> tuple[dict[str, Array], dict[str, int | slice]]:
-    """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
-    problem, nq, equations = motion.problem, motion.problem.nq, motion.equations
-    lengths = {"x": problem.size, **equations.lengths}
-    begin = dict(zip(lengths, np.cumsum([0, *lengths.values()]), strict=False))  # of rows, those of each register
-    units = np.eye(sum(lengths.values()))
-    by = {VELOCITY: units[:, nq : problem.size], TORQUE: units[:, begin[TORQUE] :][:, : motion.forces]}
-    if motion.by_parameters:
-        along = units[:, begin["p"] :] @ equations.columns(motion.values[: len(equations.names), 0], motion.backend)
-        by |= {name: along[:, [k]] for k, name in enumerate(equations.names)}
-    if START in motion.wrt:
-        by[START] = units[:, :nq] @ _displacements(motion)
-    columns: dict[str, int | slice] = {}
-    at = 0
-    for name in motion.wrt:
-        columns[name] = slice(at, at + by[name].shape[1]) if name in (START, VELOCITY, TORQUE) else at
-        at += by[name].shape[1]
-    whole = np.concatenate([by[name] for name in motion.wrt], axis=1)
-    return {name: whole[begin[name] :][:length] for name, length in lengths.items()}, columns
-
-
-def _displacements(motion: MotionRequest) -> Array:
-    """dq of displacements of the coordinates, (nq, n): G(q), or 1."""
-    system, nq = motion.problem.system, motion.problem.nq
-    if system is None or system.kinematics.quasi is None:
-        return np.eye(nq)
-    rates = cg.jacobian(
-        Graph([*system.q, *system.qd], {f"{k}": rate for k, rate in enumerate(system.q_dot)}), system.qd
-    )
-    return values_of(rates, motion.x[:, 0].tolist()).reshape(nq, system.n)

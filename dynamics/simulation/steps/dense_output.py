@@ -14,7 +14,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph._shared import Array, kept_by_first, real_array
 
-from ..row_values import converted, values_of
+from .row_values import converted, values_of
 
 if TYPE_CHECKING:
     from cgraph import Compiled

@@ -22,7 +22,7 @@ from cgraph.extend import STATEMENTS, Call, If, Program, Statement, While, copie
 from ...integrators import Problem
 from ...integrators.step import Values, call, each, lengths_of, total
 from ...integrators.step_control import COLLAPSE, RESOLUTION, SMALLEST_ATOL, registers
-from ..estimates.state_sizes import OTHERS, StateKinds, at_rest, at_rest_registers
+from .state_sizes import OTHERS, StateKinds, at_rest, at_rest_registers
 
 START = "start."  # before the names of its own registers, so that no method has to keep clear of them
 GIVEN = "t_end goal relative longest_step first instant begins".split()  # those that a run writes

@@ -17,8 +17,8 @@ from ...integrators import Method, Problem
 from ...integrators.jacobian_statements import prices
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
-from ..estimates.state_sizes import StateKinds
 from .first_step import with_first_step
+from .state_sizes import StateKinds
 
 KEPT = 8  # programs from elsewhere that a process keeps ready
 
@@ -168,4 +168,6 @@ def _arrived(pickled: bytes) -> StepProgram:
 @kept_by_first
 def compile_steps(program: StepProgram, backend: str, fma: bool) -> CompiledSteps:
     """The steps, ready to run."""
-    return CompiledSteps(program, runner(program.steps, backend, fma=fma).prepared())
+    run = runner(program.steps, backend, fma=fma)
+    run.run(run.memory({}), 0)  # makes the code that a motion runs
+    return CompiledSteps(program, run)

@@ -12,8 +12,8 @@ import cgraph as cg
 from cgraph import Compiled, Graph, Node
 from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Call, Program, runner
-from dynamics.equations.linearization.linearization_parts import LinearizationParts, linearization_parts
-from dynamics.equations.linearization.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
+from dynamics.equations.linearization.linearization import LinearRows, linear_rows
+from dynamics.equations.linearization.linearize_many import linearize_many
 from dynamics.equations.state_equation import state_equation
 from dynamics.multibody.bodies.body import Body
 from dynamics.multibody.trees.mechanism import Mechanism, as_mechanism
@@ -32,9 +32,9 @@ class Ours(Peer):
         return task_graph(self.case, task)
 
     @cached_property
-    def parts(self) -> LinearizationParts:
-        """Parts of the derivatives of forward dynamics."""
-        return linearization_parts(self.case.system)
+    def rows(self) -> LinearRows:
+        """Derivatives of forward dynamics."""
+        return linear_rows(self.case.system, "velocity")
 
     @kept_by_first
     def function(self, task: str) -> Compiled:
@@ -46,8 +46,8 @@ class Ours(Peer):
             return self._motion() if task == "motion" else self._gradient(task)
         if task == "derivatives" and mode == "batch":
             return self._many()
-        if task == "derivatives" and self.parts.size >= WRITTEN_OUT:
-            return self._jacobian() if self.case.system.kinematics.quasi is None else self._columns()
+        if task == "derivatives" and self.rows.wrt:
+            return self._jacobian()
         graph, points = self.graph(task), self.case.points(task)
         size = len(graph.nodes)
         if mode == "loop":
@@ -60,27 +60,21 @@ class Ours(Peer):
         return TimedTask(function.bind(self.case.point(task), y), lambda _: y.copy(), size)
 
     def _jacobian(self) -> TimedTask:
-        """Derivatives of a large model by `bind_jacobian` of forward dynamics, where velocities are rates."""
-        function, x = self.function("forward"), self.case.point("derivatives")
-        rows = np.empty((self.case.n, len(x)))
-        return TimedTask(function.bind_jacobian(x, rows), lambda _: rows.ravel(), len(function.graph.nodes))
+        """Derivatives of a large model by `bind_jacobian` of forward dynamics, by displacements."""
+        function, n = cg.compile(self.case.bound(self.rows.graph)), self.case.n
+        point = self.case.point("derivatives")
+        x, rows = np.zeros(function.n_in), np.empty((function.n_out, 3 * n))
+        x[: len(point)] = point
+        run = function.bind_jacobian(x, rows, wrt=self.rows.wrt)
+        return TimedTask(run, lambda _: rows[-n:].ravel(), len(function.graph.nodes))
 
     def _many(self) -> TimedTask:
         """Derivatives at the states of a batch, rows of it, as anybody calls them."""
         case = self.case
         x = np.ascontiguousarray(case.points("derivatives").T)
         states = np.split(x, [case.nq, case.nq + case.n], axis=1)
-        size = self.parts.size
+        size = len(self.rows.graph.nodes)
         return TimedTask(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), size)
-
-    def _columns(self) -> TimedTask:
-        """Derivatives of a large model: one piece of code for all columns, as `linearize_many` has it."""
-        case, n = self.case, self.case.n
-        graphs = self.parts.in_columns()
-        size = len(graphs.shared.nodes) + len(graphs.column.nodes)
-        run = runner(linearization_program(graphs._replace(shared=case.bound(graphs.shared)), n))
-        memory, row = run.memory({"state": case.point("derivatives")}), np.empty((1, run.program.width))
-        return TimedTask(run.bind(memory, row), lambda _: row[0, -3 * n * n :].copy(), size)
 
     def _motion(self) -> TimedTask:
         """The steps as one program, which is fed a row of torques a step."""

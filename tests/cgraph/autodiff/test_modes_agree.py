@@ -16,7 +16,7 @@ import cgraph as cg
 from cgraph.core.node import apply
 from cgraph.extend import cotangents
 from cgraph.operations.operation import OPS
-from cgraph.program.functions import differentiable
+from cgraph.program.functions import derivative
 from tests.tolerances import LONG_SUM
 
 NAMES = ("x", "y", "z")
@@ -91,9 +91,9 @@ def every_jacobian(graph: cg.Graph, point: dict[str, float]) -> dict[str, np.nda
 
     tall = cg.Graph(graph.inputs, {**graph.outputs, **{f"more{k}": cg.exp(v) for k, v in enumerate(graph.inputs)}})
     compiled, in_lanes = cg.compile(graph, "python"), cg.compile(graph, "python")
-    compiled.vector_cost, in_lanes.vector_cost = math.inf, 0
+    compiled._derivatives.vector_cost, in_lanes._derivatives.vector_cost = math.inf, 0
     x = list(point.values())
-    with patch.object(differentiable, "CHECK", -1):  # guarded only where a slope is infinite
+    with patch.object(derivative, "CHECK", -1):  # guarded only where a slope is infinite
         in_lanes.jacobian(x)
     one_by_one = [cg.Graph(graph.inputs, {name: node}) for name, node in graph.outputs.items()]
     return {

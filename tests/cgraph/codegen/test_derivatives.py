@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph import GraphError
 from cgraph.codegen import parts
-from cgraph.program.functions import colored_matrix, compile as functions, differentiable
+from cgraph.program.functions import compiled as functions, derivative
 from tests import high_precision
 from tests.each_row import each_row
 from tests.strategies import cases, examples
@@ -26,7 +26,7 @@ x, y, z = cg.variables("x y z")
 def compiled(graph, backend="auto", cost=None, **options):
     function = cg.compile(graph, backend, **options)
     if cost is not None:
-        function.vector_cost = cost
+        function._derivatives.vector_cost = cost
     return function
 
 
@@ -157,7 +157,7 @@ def test_a_sparse_hessian_is_compressed(backend):
 @pytest.mark.parametrize("check", [-1, math.inf])
 def test_zeros_in_a_direction_win_over_infinite_slopes(backend, check, monkeypatch):
     """Whether every entry of a direction is looked at, or only where a slope is infinite."""
-    monkeypatch.setattr(differentiable, "CHECK", check)
+    monkeypatch.setattr(derivative, "CHECK", check)
     function = compiled(cg.Graph([x, y], {"f": cg.sqrt(x) + y * y * x, "g": x * y}), backend, LANES)
     inf = math.inf
     for _ in range(2):
@@ -186,7 +186,7 @@ def test_a_look_at_slopes_sees_every_infinite_one(f, monkeypatch):
     graph, points = cg.Graph([x, y], {"f": f, "g": x * y}), [[1.0, 0.0], [0.0, 1.0], [1.0, 5e-324], [0.5, 0.5]]
     found = []
     for check in (-100, math.inf):
-        monkeypatch.setattr(differentiable, "CHECK", check)
+        monkeypatch.setattr(derivative, "CHECK", check)
         function = compiled(graph, "python", LANES)
         found.append([[function.jacobian(p), function.jvp(p, np.eye(2)), function.vjp(p, np.eye(2))] for p in points])
         found[-1] += [[function.hessian(p, weights) for weights in np.eye(2)] for p in points]
@@ -281,7 +281,7 @@ def test_a_bound_jacobian_needs_memory_that_it_can_use(backend):
 
 def test_large_matrices_are_filled_in(backend, monkeypatch):
     expected = compiled(example(), backend).jacobian(POINT)
-    monkeypatch.setattr(colored_matrix, "LARGE_MATRIX", 1)
+    monkeypatch.setattr(derivative, "LARGE_MATRIX", 1)
     function = compiled(example(), backend)
     assert np.array_equal(function.jacobian(POINT), expected)
     assert np.array_equal(function.jacobian(POINT, sparse=True).toarray(), expected)

@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph.program.functions import colored_matrix, differentiable, direction_products
+from cgraph.program.functions import derivative
 from tests.cgraph.codegen.test_derivatives import LANES, WRITTEN, compiled, example, x, y
 from tests.cgraph.engines import RUNNERS
 from tests.strategies import cases, examples
@@ -63,8 +63,7 @@ def test_random_graphs_at_many_points_are_those_at_each(case, count, cost, seed)
 @pytest.mark.parametrize("cost", [LANES, WRITTEN])
 @pytest.mark.parametrize("wrt", [None, ["z", "x"], ["unused"]])
 def test_threads_and_chosen_inputs_change_no_bit(backend, cost, wrt, monkeypatch):
-    monkeypatch.setattr(colored_matrix, "LEAST_BLOCK", 8)
-    monkeypatch.setattr(direction_products, "PANEL_NUMBERS", 40)
+    monkeypatch.setattr(derivative, "LEAST_BLOCK", 8)
     function = compiled(example(), backend, cost, fma=False)
     points = np.random.default_rng(0).uniform(0.1, 1.0, (21, 4))
     check(function, points, threads=2, wrt=wrt)
@@ -97,7 +96,7 @@ def test_functions_without_inputs_slopes_or_points(backend):
 @pytest.mark.parametrize("look", [-1, math.inf])
 @pytest.mark.parametrize("cost", [LANES, WRITTEN])
 def test_infinite_slopes_stay_with_their_points(backend, cost, look, monkeypatch):
-    monkeypatch.setattr(differentiable, "CHECK", look)
+    monkeypatch.setattr(derivative, "CHECK", look)
     function = compiled(cg.Graph([x, y], {"f": cg.sqrt(x) + y * y * x, "g": x * y}), backend, cost, fma=False)
     points = np.array([[1.0, 2.0], [0.0, 2.0], [math.nan, 1.0], [4.0, 0.0]] * 3)
     check(function, points)

@@ -4,7 +4,6 @@ import copy
 import math
 import pickle
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -15,7 +14,7 @@ from cgraph.codegen import batch_ir, llvm_engine, parts
 from cgraph.codegen.llvm_ir import scalar_ir
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
-from cgraph.program.functions import compile as functions
+from cgraph.program.functions import compiled as functions
 from tests.cgraph.engines import evaluated, graph_of, points_of
 from tests.each_row import each_row
 from tests.strategies import cases, examples
@@ -170,7 +169,7 @@ def test_a_batch_in_which_rows_lie_apart_by_a_power_of_two():
 
 
 def test_auto_says_when_a_graph_is_too_large_for_machine_code(monkeypatch):
-    monkeypatch.setattr(sys.modules["cgraph.program.functions.compile"], "LARGE_GRAPH", 5)
+    monkeypatch.setattr(functions, "LARGE_GRAPH", 5)
     with pytest.warns(RuntimeWarning, match=r"has more than 5; backend='llvm' makes machine code"):
         function = cg.compile(chain())
     assert function.source == cg.compile(chain(), "python").source

@@ -55,7 +55,7 @@ def test_a_fused_program_has_the_bits_of_its_statements(monkeypatch, fma, copies
     def results():
         run, many = (runner(each, "llvm", fma=fma) for each in (program, flat))
         starts = np.stack([many.memory(START) * scale for scale in np.linspace(0.5, 1.0, 11)], axis=1)
-        return [run.run(run.memory(START), 20).rows, many.run_many(starts, 20).rows]
+        return [run.run(run.memory(START), 20).rows, many.run(starts, 20).rows]
 
     fused = results()
     monkeypatch.setattr(fuse, "MOST_OPERATIONS", 0)

@@ -23,7 +23,7 @@ def side_by_side(program: Program, values: dict[str, Array], feed: Array, backen
     ready = runner(program, backend, fma=False)
     memories = ready.memory(values, COUNT)
     together = memories.copy()
-    rows = ready.run_many(together, passes, 1, feed).rows
+    rows = ready.run(together, passes, 1, feed).rows
     for k in range(COUNT):
         alone = memories[:, k].copy()
         own = ready.run(alone, passes, 1, feed[:, :, k]).rows
@@ -192,7 +192,7 @@ def test_what_runs_one_memory_at_a_time_is_told() -> None:
     for control in ({"stop": "n"}, {"record_if": "n"}):
         run = runner(Program({"n": 1}, [LESS], record=["n"], **control), "python")  # type: ignore[arg-type]
         with pytest.raises(cg.GraphError, match=f"programs with {next(iter(control))} run one memory at a time"):
-            run.run_many(np.zeros((1, 3)), 1)
+            run.run(np.zeros((1, 3)), 1)
 
 
 def test_a_program_that_takes_one_course_is_as_it_was() -> None:

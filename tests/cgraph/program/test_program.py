@@ -108,7 +108,7 @@ def test_registers_that_every_element_shares(backend: str, count: int, order: st
     expected = [*((2.0 + 3.0 * elements) * 0.25), *(7.0 - elements)]
     assert run.run(run.memory(start), 1).rows[0].tolist() == expected
     memories = run.memory({"ab": [[2.0, 2.0], [3.0, 0.0]], "c": 7.0, "x": np.tile(elements, (2, 1)).T, "h": 0.25}, 2)
-    both = run.run_many(memories, 1).rows[0]
+    both = run.run(memories, 1).rows[0]
     assert both[:, 0].tolist() == expected
     assert both[:count, 1].tolist() == [0.5] * count
 
@@ -121,7 +121,7 @@ def test_sum_adds_from_the_first_to_the_last(backend: str) -> None:
     expected = (((0.0 + 1e16) + 1.0) - 1e16) + 3.0
     assert run.run(run.memory({"a": values, "s": 1.0}), 1).rows.tolist() == [[expected]]
     many = np.repeat(run.memory({"a": values, "s": 1.0})[:, None], 5, axis=1)
-    assert run.run_many(many, 1).rows.ravel().tolist() == [expected] * 5
+    assert run.run(many, 1).rows.ravel().tolist() == [expected] * 5
 
 
 def test_while_and_if(backend: str) -> None:
@@ -239,7 +239,7 @@ def test_elements_have_several_numbers_in_a_register(backend: str, asked: float,
     memory = ready.memory({"k": 3.0, "pairs": [*first, *second], "c": 0.3, "asked": asked})
     waves = np.array([*map(math.sin, first)]) if wave else first
     wanted = np.stack([3.0 * waves + second, second * 0.3, first - second])
-    many = ready.run_many(np.repeat(memory[:, None], 11, axis=1), 1).rows[0]
+    many = ready.run(np.repeat(memory[:, None], 11, axis=1), 1).rows[0]
     for found in (ready.run(memory, 1).rows[0], *many.T):
         computed = int(min(count, max(1.0, asked)))
         assert found.reshape(3, count)[:, :computed].tolist() == wanted[:, :computed].tolist()
@@ -289,7 +289,7 @@ def test_wrong_use_of_a_runner(backend: str) -> None:
         run.run(np.zeros(1), -1)
     alone = runner(Program({"a": 1}, [], record=["a"], stop="a"), backend)
     with pytest.raises(cg.GraphError, match="programs with stop run one memory at a time, not side by side"):
-        alone.run_many(np.zeros((1, 3)), 1)
+        alone.run(np.zeros((1, 3)), 1)
 
 
 def test_wrong_use_of_a_loop() -> None:
@@ -329,8 +329,8 @@ def test_a_feed_is_read_before_every_pass(backend: str) -> None:
         assert ready.run(ready.memory({"x": 1.0}), 3, 1, view).rows[:, 0].tolist() == [9, 13, 13]
     many = np.stack([feed, 2.0 * feed], axis=2)
     memories = ready.memory({"x": np.array([[1.0, 0.0]])}, 2)
-    assert ready.run_many(memories.copy(), 3, 1, many).rows[:, 0].tolist() == [[1, 0], [5, 8], [13, 24]]
-    assert ready.run_many(memories.copy(), 3, 1, feed[:, :, None]).rows[:, 0].tolist() == [[1, 0], [5, 4], [13, 12]]
+    assert ready.run(memories.copy(), 3, 1, many).rows[:, 0].tolist() == [[1, 0], [5, 8], [13, 24]]
+    assert ready.run(memories.copy(), 3, 1, feed[:, :, None]).rows[:, 0].tolist() == [[1, 0], [5, 4], [13, 12]]
     for wrong in (None, feed[:2], feed[:, :3]):
         with pytest.raises(cg.GraphError, match=r"needs a feed of shape \(3, 4\)"):
             ready.run(ready.memory({}), 3, 1, wrong)

@@ -11,8 +11,7 @@ from pytest import approx
 
 import dynamics as dyn
 from dynamics import as_system, linearize, state_space
-from dynamics.equations.linearization import linearize_many as many
-from dynamics.equations.linearization.linearization_parts import linearization_parts
+from dynamics.equations.linearization import linearization
 from dynamics.equations.states.evaluate import evaluate
 from tests.dynamics.equations.test_hamiltonian import rotor
 from tests.dynamics.mechanisms import random_mechanism, turned_arm
@@ -74,7 +73,7 @@ FEW = {
 )
 def test_many_states_are_linearized_as_one(name: str, form: Any, columns: bool) -> None:
     """Written out, and column by column; B, and J A where nothing brakes, symmetric to the last bit."""
-    with patch.object(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT):
+    with patch.object(linearization, "WRITTEN_OUT", 0 if columns else linearization.WRITTEN_OUT):
         require_alike(FEW[name](), form, symmetric=name == "undamped")
 
 
@@ -102,14 +101,6 @@ def test_of_no_states_there_are_no_matrices_and_one_state_is_refused() -> None:
     assert b.shape == (0, 4, 2)
     with pytest.raises(ValueError, match="rows of states"):
         dyn.linearize_many(random_arm(2), np.zeros(2), np.zeros(2))
-
-
-def test_a_column_is_a_graph_that_no_number_of_columns_makes_longer() -> None:
-    short, long = (
-        linearization_parts(random_arm(n).system).in_columns() for n in (8, 16)
-    )  # more than are solved densely
-    assert len(long.column.nodes) < 2.5 * len(short.column.nodes)
-    assert long.factors < 2.5 * short.factors
 
 
 def bead(q, qd, t):  # type: ignore[no-untyped-def]

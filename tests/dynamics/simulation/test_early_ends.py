@@ -14,7 +14,7 @@ from pytest import mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
-from dynamics.simulation import prepared_motion
+from dynamics.simulation import run as module
 from tests.slow import slow
 
 USUAL = "dop853 radau rk4 verlet".split()
@@ -110,7 +110,7 @@ def test_a_method_is_advised_that_gets_through(method: str) -> None:
 
 @mark.parametrize("broken", [["radau"], ["radau", "rodas"]])
 def test_advice_never_costs_the_run(broken: list[str]) -> None:
-    made = prepared_motion.integration_of
+    made = module.stepper_of
 
     def failing(problem: Any, options: Any, *arguments: Any, **named: Any) -> Any:
         if options.method in broken:
@@ -118,7 +118,7 @@ def test_advice_never_costs_the_run(broken: list[str]) -> None:
         return made(problem, options, *arguments, **named)
 
     with (
-        patch.object(prepared_motion, "integration_of", failing),
+        patch.object(module, "stepper_of", failing),
         pytest.warns(dyn.SimulationWarning, match="the system is stiff") as caught,
     ):
         run = dyn.simulate(relaxing(False), [1.0], None, 0.1, "dopri5")
@@ -132,8 +132,8 @@ def test_ctrl_c_while_a_method_is_sought_is_said() -> None:
             raise KeyboardInterrupt
         return made(problem, options, *arguments, **named)
 
-    made = prepared_motion.integration_of
-    with patch.object(prepared_motion, "integration_of", interrupted), pytest.warns(dyn.SimulationWarning):
+    made = module.stepper_of
+    with patch.object(module, "stepper_of", interrupted), pytest.warns(dyn.SimulationWarning):
         run = dyn.simulate(relaxing(False), [1.0], None, 0.1, "dopri5")
     assert (run.message, run.t[-1]) == ("interrupted after t = 0.1 s", 0.1)
 

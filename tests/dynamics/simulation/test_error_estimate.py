@@ -1,5 +1,6 @@
 """The error of equal steps is told with the result, in every unit, and a warning says where it is too large."""
 
+import itertools
 import math
 import warnings
 from functools import cache
@@ -12,7 +13,8 @@ from pytest import approx, mark, raises, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
-from dynamics.simulation.steps.equal_steps import doubled, equal_steps, joined
+from dynamics.simulation.estimates.error_estimate import runs_beside
+from dynamics.simulation.steps.equal_steps import equal_steps, sampled_numbers
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import LIKE_OTHERS
 from tests.slow import slow
@@ -126,7 +128,7 @@ def test_a_second_run_that_fails_says_that_nothing_is_known() -> None:
     assert run.stats.error > 1e-3
     stiff = dyn.OdeSystem(lambda x, t: [-1000.0 * x[0] ** 3], ["x"])
     with warns(
-        dyn.SimulationWarning, match="the error is unknown: beside it a run of other steps stops, or .* at t = 0.00"
+        dyn.SimulationWarning, match="the error is unknown: beside it a run of other steps stops, or .* at t = 0.01"
     ):
         run = dyn.simulate(stiff, [1.0], None, 1.0, "rk4", dt=1.5e-3)
     assert (run.stats.error, run.success) == (math.inf, True)
@@ -135,31 +137,40 @@ def test_a_second_run_that_fails_says_that_nothing_is_known() -> None:
 @given(
     gaps=st.lists(st.sampled_from([0.1, 0.1, 0.25, 1e-3, 1e-9, 7.0 / 3.0]), min_size=1, max_size=12),
     dt=st.floats(1e-2, 3.0),
-    share=st.floats(0.0, 0.999),
     direction=st.sampled_from([1.0, -1.0]),
 )
-def test_runs_beside_have_other_steps_to_the_same_end(
-    gaps: list[float], dt: float, share: float, direction: float
+def test_runs_beside_have_other_steps_that_meet_those_of_the_run(
+    gaps: list[float], dt: float, direction: float
 ) -> None:
     instants = (direction * np.cumsum([0.0, *gaps])).tolist()
     first = equal_steps(instants, dt)
-    second = doubled(first)
-    t = share * instants[-1]
-    for steps, begin in ((second, 0.0), (doubled(second), 0.0), (joined(t, second), t)):
-        assert steps[0].begin == begin
-        assert steps[-1].end == instants[-1]
-        for part, after in zip(steps, steps[1:] + steps[-1:], strict=True):
-            assert part.begin + part.steps * part.h == approx(part.end, rel=1e-12, abs=1e-12)
-            assert after is part or after.begin == part.end
-            assert direction * part.h > 0.0
-    longest, longer = (max(abs(part.h) for part in steps) for steps in (first, second))
-    assert longer <= 3.0 * longest * (1.0 + 1e-9)
-    assert abs(joined(t, second)[0].h) <= 1.5 * longer * (1.0 + 1e-9)
-    early = joined(-t, second)
-    assert early[0].begin == -t
-    assert max(abs(part.h) for part in early) <= 1.5 * longer * (1.0 + 1e-9)
-    work = [sum(part.steps for part in steps) for steps in (first, second)]
-    assert work[1] <= 0.67 * work[0] + 1
+    law, beside, numbers, t = runs_beside(first, 4)
+    assert law.longest == max(abs(part.h) for part in first)
+    for times, (steps, done) in zip((1.0, 2.0, 4.0), [(first, numbers), *beside], strict=False):
+        assert (steps[0].begin, steps[-1].end) == (0.0, instants[-1])
+        assert all(part.end == after.begin for part, after in itertools.pairwise(steps))
+        assert all(0.0 < direction * part.h <= 2.0 * times * law.longest * (1.0 + 1e-9) for part in steps)
+        ends = [part.begin + part.h * np.arange(1.0, part.steps + 1.0) for part in steps]
+        assert np.concatenate([[0.0], *ends])[done] == approx(t, rel=1e-12, abs=1e-12)
+    assert (t[0], t[-1]) == (0.0, instants[-1])
+    few = sampled_numbers(numbers[-1], 4, 4)
+    assert len(few) <= 6
+    assert (few[1:-1] % 4 == 0).all()
+
+
+def test_an_error_is_seen_however_the_instants_of_comparison_lie() -> None:
+    """Of a run of whole periods, and of one that an event ends long before its time."""
+    turn = 2.0 * math.pi
+    wave = dyn.OdeSystem(lambda x, t: [turn * cg.cos(turn * t)], ["x"])
+    run = dyn.simulate(wave, [0.0], None, 1200.0, "rk4", dt=1.0 / 64.0, rtol=LOOSE)
+    off = np.abs(run.q[:, 0] - np.sin(turn * run.t)).max()
+    assert off / FACTOR <= run.stats.error <= FACTOR * off
+    end = dyn.Event("end", lambda q, qd, t: t - 1.0, terminal=True)
+    short, early = [
+        dyn.simulate(spring(), [1.0], [0.0], t_end, "rk4", dt=1e-3, events=events, rtol=LOOSE).stats.error
+        for t_end, events in ((1.0, ()), (3000.0, end))
+    ]
+    assert early == approx(short, rel=0.1)
 
 
 def test_the_estimate_does_not_compare_momenta_with_coordinates() -> None:

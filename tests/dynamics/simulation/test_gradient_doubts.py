@@ -1,7 +1,5 @@
 """Gradients are of the default method of `simulate`, or of equal steps that say how far off they are."""
 
-import _thread
-import threading
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -9,7 +7,6 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-import pytest
 from pytest import approx, mark, raises
 
 import cgraph as cg
@@ -136,7 +133,7 @@ def test_a_loss_that_is_no_number_is_said() -> None:
         assert words == ["2 of 3 motions doubtful: motion 1: the loss is nan of a motion that is finite"]
 
 
-@patch("dynamics.simulation.gradients.motion_run.PIECE", 16)
+@patch("dynamics.simulation.gradients.differentiated_run.PIECE", 16)
 def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate() -> None:
     """`gradient` raises, in the words of `simulate`; `gradient_many` gives NaN, and the others are as alone."""
 
@@ -166,18 +163,15 @@ def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate() -> Non
             assert np.isnan(array[[1, 3]]).all()
 
 
-@pytest.mark.usefixtures("ctrl_c")
 @mark.parametrize("method", ["dop853", "rk4"])
 @each_row("derive", [dyn.gradient, dyn.gradient_many, dyn.sensitivities])
-def test_ctrl_c_is_a_keyboard_interrupt(derive: Any, method: str) -> None:
+def test_ctrl_c_is_a_keyboard_interrupt(derive: Any, method: str, ctrl_c: Any) -> None:
     loss = [] if derive is dyn.sensitivities else [end]
     start = [[1.0]] if derive is dyn.gradient_many else [1.0]
     events = {} if derive is dyn.gradient_many else {"events": dyn.Event("late", lambda q, qd, t: t - 500.0)}
-    timer = threading.Timer(0.3, _thread.interrupt_main)
-    timer.start()
+    ctrl_c(0.3)
     with raises(KeyboardInterrupt):
         derive(SPRING, *loss, start, [0.0], 1e3 if method == "rk4" else 1e5, method, backend="python", **events)
-    timer.join()
 
 
 @mark.parametrize("given", [{}, {"method": "rk4", "dt": 1e-3, "estimate_error": False}])

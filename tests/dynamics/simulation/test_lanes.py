@@ -1,7 +1,6 @@
 """Trajectories by chosen steps in lanes: each is to the bit what it is alone, whatever its neighbors do."""
 
 import warnings
-from collections.abc import Iterator
 from functools import cache
 from typing import Any
 from unittest.mock import patch
@@ -14,7 +13,8 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import simulate_many
 from dynamics.simulation.ensembles import lanes, task
-from dynamics.simulation.ensembles.lanes import FEW_TRAJECTORIES, fits_lanes
+from dynamics.simulation.ensembles.lanes import FEW_TRAJECTORIES, VECTOR, fits_lanes
+from dynamics.simulation.steps.equal_steps import EqualSteps
 from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
 from tests.dynamics.models import oscillator, random_arm
@@ -26,13 +26,6 @@ TIMES = [0.0, 0.11, 0.12, 0.5, 1.0]
 COMPARED = (0, 3, 8, COUNT - 1)
 TOP = np.diag([0.1, 0.2, 0.25])  # kg m^2
 LANES = ("dop853", "dopri5", "rodas", "taylor")
-
-
-@pytest.fixture(autouse=True)
-def _lanes_at_once() -> Iterator[None]:
-    """No trajectory goes alone first."""
-    with patch.object(task, "MAKING", 0.0):
-        yield
 
 
 @cache
@@ -67,7 +60,7 @@ def starts(model: Any, seed: int) -> tuple[Any, Any]:
 def in_lanes(*arguments: Any, **options: Any) -> dyn.Ensemble:
     """An ensemble, of which no trajectory may be run alone."""
     pytest.importorskip("llvmlite")
-    with patch.object(task, "integration", side_effect=AssertionError("a trajectory is run alone")):
+    with patch.object(task, "stepper", side_effect=AssertionError("a trajectory is run alone")):
         return simulate_many(*arguments, **options)
 
 
@@ -146,7 +139,7 @@ def test_lanes_that_are_interrupted_go_on_with_the_same_bits() -> None:
     model = random_arm(2)
     q, qd = starts(model, 4)
     whole = simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0])
-    with patch.object(lanes, "PASSES", 3), patch.object(task, "BLOCK_TIME", 0.0):
+    with patch.object(lanes, "PASSES", 3), patch.object(lanes, "BLOCK_TIME", 0.0):
         assert same(whole, simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0]))
 
 
@@ -220,26 +213,16 @@ def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
         return step_program(problem, METHODS[method], dense=False)
 
     fine = RunOptions(1.0)
-    assert fits_lanes(program("dop853"), fine, FEW_TRAJECTORIES)
-    assert not fits_lanes(program("dop853"), fine, FEW_TRAJECTORIES - 1)
-    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), FEW_TRAJECTORIES)
-    assert not fits_lanes(program("rk4"), RunOptions(1.0, "rk4"), FEW_TRAJECTORIES)
-    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), FEW_TRAJECTORIES)
+    steps = [EqualSteps(0.0, 1e-3, 1000, 1.0)]
+    assert fits_lanes(program("dop853"), fine, [], FEW_TRAJECTORIES)
+    assert not fits_lanes(program("dop853"), fine, [], FEW_TRAJECTORIES - 1)
+    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), [], FEW_TRAJECTORIES)
+    assert fits_lanes(program("rk4"), RunOptions(1.0, "rk4"), steps, 1)
+    assert not fits_lanes(program("rk4"), RunOptions(1.0, "rk4", max_steps=999), steps, FEW_TRAJECTORIES)
+    assert not fits_lanes(program("gauss4"), RunOptions(1.0, "gauss4"), steps, VECTOR - 1)
+    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), [], FEW_TRAJECTORIES)
     q, qd = starts(spring(), 7)
     one_by_one = simulate_many(spring(), q, qd, 0.3, "radau", t_eval=[0.3])
     each_is_alone(spring(), one_by_one, q, qd, 0.3, "radau", t_eval=[0.3])
     in_python = simulate_many(spring(), q, qd, 0.05, t_eval=[0.05], backend="python")
     each_is_alone(spring(), in_python, q, qd, 0.05, "dop853", t_eval=[0.05], backend="python")
-
-
-def test_lanes_are_made_once_trajectories_alone_took_as_long() -> None:
-    """After one trajectory alone, or never."""
-    model, rng = random_arm(2), np.random.default_rng(5)
-    arguments = (model, *rng.normal(size=(2, COUNT, 2)), 1.0, "dop853")
-    at_once, made = simulate_many(*arguments, t_eval=TIMES), []
-    for seconds in (1e-4, 1e9):
-        cg.clear_caches()
-        with patch.object(task, "MAKING", seconds), patch.object(task, "lanes_of", wraps=task.lanes_of) as making:
-            assert same(at_once, simulate_many(*arguments, t_eval=TIMES))
-        made.append(making.called)
-    assert made == [True, False]

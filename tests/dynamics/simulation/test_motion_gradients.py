@@ -15,9 +15,10 @@ import dynamics as dyn
 from dynamics import METHODS, System
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.integrators import derive
-from dynamics.simulation.gradients import motion_run
+from dynamics.simulation.gradients import differentiated_run
 from dynamics.simulation.gradients.gradient import MotionGradient
-from dynamics.simulation.gradients.motion_equations import motion_equations, rate_pullback, sharing
+from dynamics.simulation.gradients.motion_programs import motion_equations
+from dynamics.simulation.gradients.rate_pullback import rate_pullback, sharing
 from tests.bench.speed.scenes import load
 from tests.dynamics.mechanisms import random_mechanism
 from tests.dynamics.models import driven_pendulum, magnetic, random_arm, relativistic
@@ -318,8 +319,7 @@ def test_a_rate_is_pulled_back_by_what_it_has_solved(name: str, count: int) -> N
     problem = derive(load(name).model, {})
     n = problem.size - problem.nq
     equations = motion_equations(problem, n)
-    shared = sharing(equations)
-    assert shared is not None
+    shared = sharing(equations.problem.rate, equations.pullback)
     pulled = shared[1]([*equations.problem.rate.inputs[: 2 * n]])
     assert sum([bool(node.args) for node in pulled.nodes]) == count
 
@@ -327,7 +327,7 @@ def test_a_rate_is_pulled_back_by_what_it_has_solved(name: str, count: int) -> N
 def test_checkpoints_give_the_same_numbers() -> None:
     given = {"t_end": 1.0, "dt": 0.01, "wrt": WRT, "backend": "python"}
     whole = dyn.gradient(BEAD, loss, [0.5], [0.2], **given)
-    with patch.object(motion_run, "MOST_RECORDED", 1000):
+    with patch.object(differentiated_run, "MOST_RECORDED", 1000):
         again = dyn.gradient(BEAD, loss, [0.5], [0.2], **given)
     assert (whole.checkpoints, again.checkpoints) == (0, 10)
     assert {name: np.squeeze(again[name]) for name in WRT} == {name: np.squeeze(whole[name]) for name in WRT}

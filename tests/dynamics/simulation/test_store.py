@@ -45,7 +45,6 @@ def crossings(ensemble: dyn.Ensemble) -> list[Any]:
 
 
 @pytest.mark.filterwarnings("ignore::dynamics.SimulationWarning")
-@patch.object(task, "MAKING", 0.0)  # s: lanes at once, where there are any
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_missing_is_run_and_nothing_else(kind: str, tmp_path: Path) -> None:
     alone = sweep(**KINDS[kind])

@@ -120,7 +120,7 @@ def programs_made() -> int:
 
 def test_threads_make_the_code_once() -> None:
     model, q, qd = arms(40, 4)
-    with patch.object(task, "runner", wraps=task.runner) as making:
+    with patch.object(lanes, "runner", wraps=lanes.runner) as making:
         simulate_many(model, q, qd, 0.1, "rk4", workers=4, chunk=8)
         simulate_many(model, q, qd, 0.2, "rk4", workers=4, chunk=8)
     assert making.call_count == 1
@@ -156,16 +156,12 @@ def test_dask_changes_nothing() -> None:
         assert [each.tolist() for each in gathered(drawn, range(4))] == [drawn(seed).tolist() for seed in range(4)]
 
 
-@mark.usefixtures("ctrl_c")
 @mark.parametrize(("workers", "method"), [(1, "midpoint"), (3, "rk4"), *slow((1, "rk4"), (3, "midpoint"))])
-def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> None:
-    before, main = set(threading.enumerate()), threading.main_thread().ident
-    assert main is not None
+def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str, ctrl_c: Any) -> None:
+    before = set(threading.enumerate())
     model, q, qd = arms(64)
     simulate_many(model, q, qd, 0.01, method, workers=workers)  # the code is made
-    timer = threading.Timer(0.3, lambda: signal.pthread_kill(main, signal.SIGINT))
-    begin = time.perf_counter()
-    timer.start()
+    begin, timer = time.perf_counter(), ctrl_c(0.3)
     with raises(KeyboardInterrupt):
         simulate_many(model, q, qd, 1e9, method, t_eval=[0.0, 1e9], workers=workers, chunk=8)
     timer.join()
@@ -175,21 +171,18 @@ def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> No
 
 def test_ctrl_c_is_not_lost_at_the_end_of_a_chunk() -> None:
     """Machine code hands a signal on when it returns, and its chunk may be done then."""
-    advance, made = lanes.EqualInLanes.advance, []
+    made: list[Any] = []
 
-    def interrupted(self: lanes.EqualInLanes, seconds: float) -> bool:
-        goes_on = advance(self, seconds)
-        made.append(goes_on)
-        if not goes_on and len(made) == 1:
-            raise KeyboardInterrupt
-        return goes_on
+    def interrupted(*arguments: Any) -> Any:
+        made.append(lanes.equal_in_lanes(*arguments))
+        raise KeyboardInterrupt
 
-    with patch.object(lanes.EqualInLanes, "advance", interrupted), raises(KeyboardInterrupt):
+    with patch.object(task, "equal_in_lanes", interrupted), raises(KeyboardInterrupt):
         simulate_many(*arms(96), 0.01, "rk4", t_eval=[0.01], chunk=32, estimate_error=False)
-    assert made == [False]
+    assert len(made) == 1
 
 
-@patch.object(task.VectorizedIntegration, "advance", side_effect=RuntimeError("broken"))
+@patch.object(task, "equal_in_lanes", side_effect=RuntimeError("broken"))
 def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(broken: object) -> None:
     before = set(threading.enumerate())
     with raises(RuntimeError, match="broken"):

@@ -95,7 +95,7 @@ def test_a_function_that_nobody_finds_is_a_sentence() -> None:
     scene = dyn.scenes.Scene("wheel", "turns", turning, (0.0,), (1.0,), 1.0)
     motion = dyn.prepare(held(), tau=lambda q, qd, t: [0.0, 0.0])
     event, hold = dyn.Event("up", lambda q, qd, t: q[0]), dyn.SampledController(lambda q, qd, t: q, 0.1)
-    rows = (turning, "a System"), (scene, "a System"), (motion, "a PreparedMotion"), (event, "an Event")
+    rows = (turning, "a System"), (scene, "a System"), (motion, "a Run"), (event, "an Event")
     for given, name in (*rows, (hold, "a SampledController")):
         with pytest.raises(
             pickle.PicklingError,

@@ -1,4 +1,4 @@
-"""Derivatives of Take, Scatter, Push, Pop: numbers go where their values came from."""
+"""Derivatives of Factor, Solve, Take, Scatter, Push, Pop: linear equations, and numbers that are moved about."""
 
 from __future__ import annotations
 
@@ -8,11 +8,79 @@ from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
 from ..statement import names_in, row_of, with_names
-from ..statements.call import Call, copied, copied_or_zero, zeroed
+from ..statements.call import Call, copied, copied_or_zero
+from ..statements.matrix import Factor, Solve
 from ..statements.memory import Pop, Push, Scatter, Take
-from .adjoint import Adjoint
-from .single_assignment import Assignment
-from .tangent import Tangent
+from .jvp import Assignment, Tangent
+from .transpose import Adjoint
+
+# The tangent, and the cotangent, of a factored matrix are those of the matrix A itself.
+
+
+def push_factor(assignment: Assignment, tangent: Tangent) -> None:
+    """The tangent of the factors is A_dot."""
+    (before,), factor = assignment.sources, assignment.statement
+    assert isinstance(factor, Factor)
+    if before in tangent.dots and factor.matrix in tangent.active:
+        tangent.dots[factor.matrix] = tangent.dots[before]
+
+
+def pull_factor(assignment: Assignment, adjoint: Adjoint) -> None:
+    """A_bar += the cotangent of the factors."""
+    (before,), factor = assignment.sources, assignment.statement
+    assert isinstance(factor, Factor)
+    if factor.matrix in adjoint.bars and before in adjoint.active:
+        adjoint.collect(before, adjoint.bars[factor.matrix])
+
+
+def push_solve(assignment: Assignment, tangent: Tangent) -> None:
+    """A x = b: A x_dot = b_dot - A_dot x, and with A^T for A the same."""
+    (right,), solve = assignment.sources, assignment.statement
+    assert isinstance(solve, Solve)
+    matrix, side, n = tangent.dots.get(solve.matrix), tangent.dots.get(right), tangent.lengths[solve.vector]
+    if matrix is None and side is None:
+        return
+    dot = tangent.dot(solve.vector)
+    side = side or tangent.zero(right)
+    if matrix is None:
+        tangent.add(copied(side, dot))
+    else:
+        tangent.add(Call(_less_product(n, solve.transposed), (side, matrix, solve.vector), (dot,)))
+    tangent.add(Solve(solve.matrix, solve.pivots, dot, solve.transposed))  # x_dot = A^-1 (b_dot - A_dot x)
+
+
+def pull_solve(assignment: Assignment, adjoint: Adjoint) -> None:
+    """x = A^-1 b: b_bar = A^-T x_bar, A_bar = -b_bar x^T; of A^T, A_bar = -x b_bar^T."""
+    (right,), solve = assignment.sources, assignment.statement
+    assert isinstance(solve, Solve)
+    if solve.vector not in adjoint.bars:
+        return
+    bar, n = adjoint.bar(right), adjoint.lengths[solve.vector]
+    adjoint.add(copied(adjoint.bars[solve.vector], bar))
+    adjoint.add(Solve(solve.matrix, solve.pivots, bar, not solve.transposed))  # b_bar = A^-T x_bar
+    if solve.matrix in adjoint.active:
+        matrix = adjoint.bar(solve.matrix)
+        sides = (solve.vector, bar) if solve.transposed else (bar, solve.vector)
+        adjoint.add(Call(_outer(n), sides, (matrix,)))
+        adjoint.collect(solve.matrix, matrix)
+    if right in adjoint.active:
+        adjoint.collect(right, bar)
+
+
+def _less_product(n: int, transposed: bool) -> Graph:
+    """b - A x, or b - A^T x."""
+    b, x = (variables([f"{name}{k}" for k in range(n)]) for name in "bx")
+    a = variables([f"a{k}" for k in range(n * n)])
+    at = [[a[n * j + i] if transposed else a[n * i + j] for j in range(n)] for i in range(n)]
+    rows = [sum([at[i][j] * x[j] for j in range(n)], constant(0.0)) for i in range(n)]
+    return Graph([*b, *a, *x], {f"{i}": b[i] - row for i, row in enumerate(rows)})
+
+
+def _outer(n: int) -> Graph:
+    """-a b^T, row by row."""
+    a, b = (variables([f"{name}{k}" for k in range(n)]) for name in "ab")
+    return Graph([*a, *b], {f"{i}_{j}": -a[i] * b[j] for i in range(n) for j in range(n)})
+
 
 # The tangent of a stack is a stack of tangents with a count of its own, and what is put on one comes off the other.
 # What a Scatter does not write stays as it was, and so does its tangent; its cotangent goes on to before.
@@ -31,7 +99,7 @@ def push_moved(assignment: Assignment, tangent: Tangent) -> None:
     givers = {*names_in(statement, read), *[before[name] for name in written if name in before]}
     if givers.isdisjoint(tangent.dots) or tangent.active.isdisjoint(written):
         return
-    pushed = with_names(statement, read, tangent.dot_or_zero)
+    pushed = with_names(statement, read, lambda name: tangent.dots.get(name) or tangent.zero(name))
     dots = {name: tangent.dot(name) for name in written}
     works = {name: dots.get(name) or tangent.fresh(name, tangent.lengths[name]) for name in changed}
     for name, work in works.items():
@@ -67,8 +135,8 @@ def pull_scatter(assignment: Assignment, adjoint: Adjoint) -> None:
     if scatter.target not in adjoint.bars:
         return
     if before in adjoint.active:
-        bar, none = adjoint.bar(before), adjoint.fresh("none", 1)
-        adjoint.add(copied(adjoint.bars[scatter.target], bar), zeroed(none))
+        bar, none = adjoint.bar(before), adjoint.zero(scatter.source)
+        adjoint.add(copied(adjoint.bars[scatter.target], bar))
         adjoint.add(Scatter(none, bar, (0,) * len(scatter.places), scatter.places))
         adjoint.collect(before, bar)
     if scatter.source in adjoint.active:
@@ -84,10 +152,9 @@ def pull_push(assignment: Assignment, adjoint: Adjoint) -> None:
         return
     stack = assignment.sources[0]
     work, left = adjoint.bar(push.stack), adjoint.fresh("count", 1)
-    bars = tuple([adjoint.bar(name) for name in push.rows])
-    none = tuple([adjoint.bar(name) for name in push.rows])
-    adjoint.add(copied(adjoint.bars[push.stack], work), copied(push.count, left), Pop(work, left, bars))
-    adjoint.add(*[zeroed(name) for name in none], Push(work, left, none))
+    bars, none = tuple([adjoint.bar(name) for name in push.rows]), tuple([adjoint.zero(name) for name in push.rows])
+    adjoint.add(copied(adjoint.bars[push.stack], work), copied(push.count, left))
+    adjoint.add(Pop(work, left, bars), Push(work, left, none))
     adjoint.collect(stack, work)
     for name, bar in zip(push.rows, bars, strict=True):
         if name in adjoint.active:
@@ -98,8 +165,8 @@ def pull_pop(assignment: Assignment, adjoint: Adjoint) -> None:
     """The cotangents of the row go onto a stack that is 0 elsewhere."""
     pop = assignment.statement
     assert isinstance(pop, Pop)
-    if adjoint.seeded(pop.rows) and pop.stack in adjoint.active:
-        bar, left = adjoint.bar(pop.stack), adjoint.fresh("count", 1)
-        adjoint.add(zeroed(bar), copied(pop.count, left))
-        adjoint.add(Push(bar, left, tuple([adjoint.bar_or_zero(name) for name in pop.rows])))
+    if not adjoint.bars.keys().isdisjoint(pop.rows) and pop.stack in adjoint.active:
+        bar, left = adjoint.zero(pop.stack), adjoint.fresh("count", 1)
+        rows = tuple([adjoint.bars.get(name) or adjoint.zero(name) for name in pop.rows])
+        adjoint.add(copied(pop.count, left), Push(bar, left, rows))
         adjoint.collect(pop.stack, bar)

@@ -1,0 +1,349 @@
+"""A run of motions along which derivatives go: through its steps, and through the events that reset or end it.
+
+An event happens where g(x, t) = 0, so that the length h of the step that arrives there depends on where it began:
+dh = -(dg/dx dx) / (dg/dx dx/dh + dg/dt). The steps after it begin from the reset state at that instant, and equal
+steps all depend on it. These jumps are those of the numbers that are computed: h is solved for to rounding.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph._shared import Array, Tape, kept_by_first, run_passes
+from cgraph.extend import Runner
+
+from ..events.event import WatchedEvent, event_program
+from ..outcome import MotionError
+from ..stepper import nonfinite, unsolved
+from ..steps.dense_output import Indices
+from ..steps.row_values import values_of
+from .motion_programs import LOSS, motion_programs
+from .motions import TORQUE, Motions, Stretch
+
+MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
+PIECE = 4096  # passes between two looks at Python
+FEW_DIRECTIONS = 4  # directions: of fewer, iterations one after another are done sooner than a vector of them
+MOST_TURNS = 20  # of Newton's method for the length of a step that arrives at an event
+
+
+@dataclass(eq=False)
+class Segment:
+    """Steps that were run.  begin: the state (m, N) before the first one.  x: the state after the last one.
+
+    start: tape of what is before the first step, if anything.  tape: that of the steps.
+    """
+
+    steps: Stretch
+    start: Tape | None
+    tape: Tape
+    begin: Array
+    x: Array
+
+
+class DifferentiatedRun:
+    """N motions from their starts to their ends, once; then along them. With events N = 1.
+
+    forwards: tangents are to be pushed on, else cotangents pulled back.  running: the loss of a step, a graph.
+    every: keep the states after every so many steps alone, of each segment; nothing goes along the motion.
+    x, t: the end of the motion, (m, N) in states of its steps, and all times.  loss: the running one, (N,).
+    Raises MotionError for a motion alone that does not stay finite, or whose equations are not solved; one side by side
+    with others has an end that is not finite.
+    """
+
+    def __init__(
+        self, motions: Motions, running: Graph | None = None, *, forwards: bool = False, every: Sequence[int] = ()
+    ) -> None:
+        self.motions = motions = motions.with_steps()
+        self.running, self.forwards = running, forwards
+        watched = event_program(motions.problem, motions.events).events if motions.events else ()
+        self.events = {event.name: event for event in watched}
+        by = (["p", "c"] if motions.by_parameters else []) + (["t", "h"] if motions.events else [])
+        self.programs = motion_programs(
+            motions.equations,
+            motions.options.integrator,
+            (*[name for name in motions.wrt if name == TORQUE], *by),
+            running,
+            motions.options.backend,
+            each_step=motions.each_step,
+            forwards=forwards,
+            many=motions.many > 1,
+        )
+        self.segments: list[Segment] = []
+        begin = float(motions.steps[0].t[0])
+        x = self._through(motions.equations.start, motions.x, begin)
+        for stretch, kept in zip(motions.steps, every or itertools.repeat(0), strict=False):
+            self.segments.append(self._segment(stretch.begun(begin), x, kept))
+            begin = float(self.segments[-1].steps.t[-1])
+            x = self._through(self._reset(stretch), self.segments[-1].x, begin)
+        self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
+        self.loss = np.zeros(motions.many)
+        if running is not None:
+            self.loss = sum([each.tape.value(LOSS)[0] for each in self.segments], self.loss)
+
+    @property
+    def end(self) -> Array:
+        """The end of the motions in q and qd, (m, N)."""
+        return self._through(self.motions.equations.end, self.x, float(self.t[-1]))
+
+    @property
+    def checkpoints(self) -> int:
+        """Steps between two states that were kept; 0 where all were."""
+        return max([each.tape.checkpoints for each in self.segments])
+
+    def _reset(self, steps: Stretch) -> Graph | None:
+        """Reset of the state at the end of a segment."""
+        return self.events[steps.event].reset if steps.event else None
+
+    def _segment(self, steps: Stretch, x: Array, every: int) -> Segment:
+        """Run steps from the state x on."""
+        motions, many, count = self.motions, self.motions.many, len(steps.h)
+        start_program, step_program, failed = self.programs
+        tau = motions.tau[0] if motions.each_step else motions.tau
+        values = motions.equations.registers(np.concatenate([tau, motions.values])) | {"t": steps.t[:1], "x": x}
+        if motions.options.adaptive and not failed:  # rtol = 0: what is iterated is solved to rounding
+            tolerances = {"rtol": motions.options.relative, "atol": motions.options.absolute}
+            values |= {name: np.asarray(value) for name, value in tolerances.items()}
+        start = None
+        if start_program is not None:
+            start = Tape(start_program, values, lambda first, last: np.empty((last - first, 0, 1)), many)
+            start.run(0, 1)
+            values |= {name: start.value(name) for name in start_program.passes.handed}
+
+        def fed(first: int, last: int) -> Array:
+            """Inputs of the steps first .. last - 1, (.., width, N), or one for all motions without own forces."""
+            part = slice(first, last)
+            if not motions.each_step:
+                return np.stack([steps.t[part], steps.h[part]], axis=1)[:, :, None]
+            rows = np.empty((last - first, 2 + motions.equations.forces, many))
+            rows[:, 0].T[...], rows[:, 1].T[...], rows[:, 2:] = steps.t[part], steps.h[part], motions.tau[part]
+            return rows
+
+        fits = every > 0 or 8 * step_program.forward.program.width * count * many <= MOST_RECORDED
+        tape = Tape(step_program, values, fed, many, 0 if fits else math.ceil(math.sqrt(count)), every or 1)
+        segment = Segment(steps, start, tape, tape.value("x"), x)
+        tape.run(0, count - bool(steps.event))
+        if steps.event:
+            self._arrive(segment, self.events[steps.event])
+        segment.x = tape.value("x")
+        bad = ~np.isfinite(segment.x).all(axis=0)
+        if failed:
+            bad |= tape.value(failed)[0] != 0.0
+        if bad.any() and many == 1:
+            raise MotionError(f"the motion {self.stopped(0, segment)}")
+        segment.x[:, bad] = np.nan
+        return segment
+
+    def _arrive(self, segment: Segment, event: WatchedEvent) -> None:
+        """Make the last step of a segment, as long as it takes to where the event happens."""
+        t, h, tape, count, last = segment.steps.t, segment.steps.h, segment.tape, len(segment.steps.h), np.inf
+        before = float(t[-2])
+        for _ in range(MOST_TURNS):
+            memory = tape.memory.copy()
+            run_passes(tape.of.forward, memory, 1, 1, tape.feed(count - 1, count))
+            x = tape.value("x", memory)
+            point = self.motions.point(x, t[-1])
+            slopes, x_dot = self._gradient_at(event.name, x, t[-1]), _evaluated(self.motions.problem.rate, point)
+            # Newton's method: h -= g / (dg/dx xdot + dg/dt)
+            change = float((_evaluated(event.values, point) / (slopes[: len(x)].T @ x_dot + slopes[len(x)]))[0, 0])
+            if not abs(change) < last:
+                break
+            last = abs(change)
+            h[-1] -= change
+            t[-1] = before + h[-1]
+        if not np.isfinite(h[-1]):
+            raise MotionError(f"event {event.name!r} at t = {before:.6g} s does not pass through zero with a slope")
+        tape.run(count - 1, count)
+
+    def stopped(self, k: int, segment: Segment) -> str:
+        """Place where motion k went wrong in a segment: the first step after which it has, in words."""
+        motions, tape, m = self.motions, segment.tape, self.motions.problem.size
+        memory, before, names = tape.first.copy(), segment.begin[:, k], motions.problem.components
+        for first in range(0, len(segment.steps.h), PIECE):
+            last = min(first + PIECE, len(segment.steps.h))
+            # a row ends with the state after the step
+            rows = run_passes(tape.of.forward, memory, last - first, 1, tape.feed(first, last))[:, :, k]
+            bad = ~np.isfinite(rows[:, -m:]).all(axis=1) | (rows[:, -m - 1] != 0.0 if self.programs.failed else False)
+            if bad.any():
+                break
+            before = rows[-1, -m:]
+        step = int(np.argmax(bad))
+        x, before = rows[step, -m:], rows[step - 1, -m:] if step else before
+        what = nonfinite(names, x) or unsolved(names, before, x)
+        return f"stopped at t = {segment.steps.t[first + step + 1]:.6g} s: {what}"
+
+    def states(self, segment: Segment) -> tuple[Indices, Array]:
+        """After how many steps (T,), and states (T, m, N), from the start to the end: all that are kept."""
+        tape, count, m = segment.tape, len(segment.steps.h), len(segment.x)
+        if tape.checkpoints:
+            kept = [tape.value("x", memory) for *_, memory in tape.blocks]
+            return np.array([*[block.first for block in tape.blocks], count]), np.array([*kept, segment.x])
+        numbers = [np.arange(first + tape.every, last + 1, tape.every) for first, last, _ in tape.blocks]
+        rows = [kept[:, -m:] for *_, kept in tape.blocks]
+        if not len(numbers[-1]) or numbers[-1][-1] != count:
+            numbers, rows = [*numbers, np.array([count])], [*rows, segment.x[None]]
+        return np.concatenate([[0], *numbers]), np.concatenate([segment.begin[None], *rows])
+
+    def pulled(self, bars: Array) -> tuple[Array, Array]:
+        """Cotangents (m + 1 + .., N) of start, t and inputs, from those of the end; and rows of forces of each step."""
+        m, motions = len(self.x), self.motions
+        for k, segment in reversed(list(enumerate(self.segments))):
+            steps, end, later = segment.steps, segment.steps.t[-1], 0.0
+            if (reset := self._reset(steps)) is not None:
+                bars = self._pulled_at(reset, segment.x, end, bars)
+            if steps.event:
+                g = self._gradient_at(steps.event, segment.x, end)
+                # lambda with h_bar = x_bar dx/dh + t_bar + lambda (dg/dx dx/dh + dg/dt) = 0
+                slope = self._by_last_length(segment, g[:m]) + g[m]
+                bars = bars - (self._by_last_length(segment, bars[:m]) + bars[m]) / slope * g
+                later = float(bars[m, 0])
+            vectors, rows, failed = segment.tape.pulled({"x": bars[:m], LOSS: np.ones(1)})
+            self._require_solved(failed)
+            if segment.start is not None:
+                vectors, _, failed = segment.start.pulled(vectors)
+                self._require_solved(failed)
+            begin, lengths = vectors.get("t", np.zeros((1, motions.many))), motions.equations.lengths
+            if k:
+                # cotangents of the instants and lengths of the steps, to which the event adds at the last
+                t, h = rows[:, :2, 0].T.copy()
+                t[-1] += later
+                if steps.event:
+                    h[-1] = 0.0  # which the event determines
+                # begin_bar = sum over steps of t_bar dt/dbegin + h_bar dh/dbegin
+                begin = begin + (t @ steps.by_t[:-1] + h @ steps.by_h)
+            inputs = [vectors.get(name, np.zeros((length, motions.many))) for name, length in lengths.items()]
+            bars = np.concatenate([vectors["x"], begin, bars[m + 1 :] + np.concatenate(inputs)])
+        return self._pulled_at(motions.equations.start, motions.x, float(self.t[0]), bars), rows
+
+    def _by_last_length(self, segment: Segment, seed: Array) -> float:
+        """Cotangent of h of the last step of one motion, from that of x (m, 1) after it: t and h are what varies."""
+        tape, derivative = segment.tape, segment.tape.of.derivative
+        memory, (_, _, rows) = tape.derivative({"x": seed}, 1), next(tape.recorded(backwards=True))
+        return float(run_passes(derivative, memory, 1, 1, rows[-1:, : derivative.program.feed_width])[0, 1, 0])
+
+    def pushed(self, dots: Array) -> tuple[Array, Array, Array, Array]:
+        """Rows of one motion, t (T,) and q with qd (T, m), and the tangents of both, (T, k) and (T, m, k).
+
+        dots: tangents (m + 1 + .., k) of the start, of t and of inputs, along k directions.
+        """
+        m, motions = len(self.x), self.motions
+        dots = self._pushed_at(motions.equations.start, motions.x, float(self.t[0]), dots)
+        parts = []
+        for segment in self.segments:
+            steps, end = segment.steps, float(segment.steps.t[-1])
+            lengths = steps.by_h[:, None] * dots[m] if self.events else np.empty((0, 0))
+            times, given = steps.by_t[:, None] * dots[m], dots
+            if steps.event:  # the last column: the length of the last step alone
+                lengths[-1], given = 0.0, np.pad(dots, ((0, 0), (0, 1)))
+                lengths = np.pad(lengths, ((0, 0), (0, 1)))
+                lengths[-1, -1] = 1.0
+            states, tangents = self._along(segment, given, lengths)
+            if steps.event:
+                g = self._gradient_at(steps.event, segment.x, end)[:, 0]
+                tangents, slope = tangents[:, :, :-1], tangents[-1, :, -1]
+                # dg = dg/dx dx + dg/dt dt + dg/dp dp at fixed h, and dh = -dg / (dg/dx dx/dh + dg/dt)
+                length = -(g @ np.concatenate([tangents[-1], times[-2:-1], dots[m + 1 :]])) / (g[:m] @ slope + g[m])
+                # dx += dx/dh dh, dt += dh
+                tangents[-1] += slope[:, None] * length
+                times[-1] = times[-2] + length
+            parts.append((steps.t, states, times, tangents))
+            dots = np.concatenate([tangents[-1], times[-1:], dots[m + 1 :]])
+            dots = self._pushed_at(self._reset(steps), segment.x, end, dots)
+        if self._reset(self.segments[-1].steps) is not None:
+            parts.append((self.t[-1:], self.x.T, dots[m : m + 1], dots[None, :m]))
+        t, x, t_dot, x_dot = (np.concatenate(column) for column in zip(*parts, strict=True))
+        if (graph := motions.equations.end) is not None:
+            points = [*x.T[:, :, None], t[:, None], *motions.inputs[:, :, None]]
+            moved = [*points, *x_dot.swapaxes(0, 1), t_dot, *dots[m + 1 :]]
+            x = values_of(graph, points, len(t), 1)[:, :, 0].T
+            x_dot = values_of(_tangent(graph), moved, *t_dot.shape).swapaxes(0, 1)
+        return t, x, t_dot, x_dot
+
+    def _along(self, segment: Segment, dots: Array, lengths: Array) -> tuple[Array, Array]:
+        """States (steps + 1, m), and tangents (steps + 1, m, k), from those of start, t and inputs.
+
+        lengths: (steps, k), tangents of the lengths of the steps; none where these are constants.
+        """
+        tape, start, m, many = segment.tape, segment.start, len(self.x), dots.shape[1]
+        vectors = {"x": dots[:m], "t": dots[m : m + 1], **self.motions.equations.registers(dots[m + 1 :])}
+        if start is not None:
+            memory = start.derivative(vectors, many)
+            _run_all(start.of.derivative, memory, next(start.recorded(backwards=False)).kept)
+            found, failed = start.vectors(memory)
+            self._require_solved(failed)
+            vectors |= found
+        push, names, memory = tape.of.derivative, tape.of.linear.vectors, tape.derivative(vectors, many)
+        states, tangents = [segment.begin.T], [push.read(memory, names["x"]).copy()[None]]
+        changes = set((np.flatnonzero((np.diff(lengths, axis=0) != 0.0).any(axis=1)) + 1).tolist())
+        for first, last, rows in tape.recorded(backwards=False):
+            states.append(rows[:, -m:, 0])
+            for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
+                if len(lengths):
+                    push.read(memory, names["h"])[...] = lengths[begin]
+                tangents.append(_run_all(push, memory, rows[begin - first : end - first]))
+        self._require_solved(tape.vectors(memory)[1])
+        return np.concatenate(states), np.concatenate(tangents)
+
+    def _require_solved(self, failed: Array) -> None:
+        """Raises MotionError where tangents or cotangents are those of equations that were not solved."""
+        if ((failed != 0.0) & np.isfinite(self.x).all(axis=0)).any():
+            raise MotionError("the equations of a step's derivative were not solved: the step is too long")
+
+    def _gradient_at(self, event: str, x: Array, t: float) -> Array:
+        """Slopes of an event's quantity by x, t and inputs, (m + 1 + .., 1)."""
+        return _evaluated(_pullback(self.events[event].values), np.append(self.motions.point(x, t), [[1.0]], axis=0))
+
+    def _pulled_at(self, graph: Graph | None, x: Array, t: float, bars: Array) -> Array:
+        """Cotangents (m + 1 + .., N) of x, t and inputs, with those of the state that a graph makes of them."""
+        if graph is None:
+            return bars
+        m = len(x)
+        before = _evaluated(_pullback(graph), np.concatenate([self.motions.point(x, t), bars[:m]]))
+        before[m:] += bars[m:]
+        return before
+
+    def _pushed_at(self, graph: Graph | None, x: Array, t: float, dots: Array) -> Array:
+        """Tangents (m + 1 + .., k) of x, t and inputs, x the state that a graph makes of them."""
+        if graph is None:
+            return dots
+        moved = values_of(_tangent(graph), [*self.motions.point(x, t), *dots], dots.shape[1])
+        return np.concatenate([moved, dots[len(x) :]])
+
+    def _through(self, graph: Graph | None, x: Array, t: float) -> Array:
+        """The states (m, N) that a graph over the states, t and parameters makes of some; the same without a graph."""
+        return x if graph is None else _evaluated(graph, self.motions.point(x, t))
+
+
+def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
+    """The rows (passes, width, k) of k memories that are fed the same."""
+    feed, many = rows[:, : ready.program.feed_width], memories.shape[1]
+    if ready.masked is ready.program or many >= FEW_DIRECTIONS:
+        return run_passes(ready, memories, len(feed), 1, feed)
+    found = np.empty((len(feed), ready.program.width, many))
+    for k in range(many):
+        memory = memories[:, [k]]
+        found[:, :, [k]] = run_passes(ready, memory, len(feed), 1, feed)
+        memories[:, [k]] = memory
+    return found
+
+
+@kept_by_first
+def _pullback(graph: Graph) -> Graph:
+    return cg.vjp(graph)
+
+
+@kept_by_first
+def _tangent(graph: Graph) -> Graph:
+    return cg.jvp(graph)
+
+
+def _evaluated(graph: Graph, points: Array) -> Array:
+    """The outputs, (k, N), of a graph at points (n, N)."""
+    count = points.shape[1]
+    return values_of(graph, points if count > 1 else points[:, 0].tolist(), count)
