@@ -361,3 +361,29 @@ def test_a_batch_records_what_a_pass_records_from_every_value(backend):
         runner(Program({"x": 2, "u": 2, "z": 2, "s": 1}, body[1:2], record=["z"]), backend).batch("u", values)
     with pytest.raises(cg.GraphError, match=r"shape \(N, 2\)"):
         run.batch("x", values[0])
+
+
+def test_a_listing_tells_loops_branches_and_what_a_statement_reads_before_it_writes() -> None:
+    a, b = cg.variables("a b")
+    swap, long = cg.Graph([a, b], {"p": b, "q": a}), cg.Graph([a], {"o": sum([cg.sin(a * k) for k in range(1, 9)])})
+    turn = (Call(swap, ("x", "y"), ("x", "y")), Call(ONE, ("n",), ("n",)))
+    body = [
+        While("n", (If("x", turn, (Map(long, ("v",), ("v",)),)),)),
+        Sum(cg.Graph([a], {"s": a * (1 / 3)}), ("v",), "x"),
+        Solve("m", "v", "v", transposed=True),
+    ]
+    program = Program({"x": 1, "y": 1, "n": 1, "v": 2, "m": 4}, body, ["x"], record_if="y", stop="n", feed=["y"])
+    assert program.listing({"waves": long}).splitlines()[3:] == [
+        "before each pass: y from the feed",
+        "each pass:",
+        "    while n > 0:",
+        "        if x > 0:",
+        "            x, y = f1(x, y)  # 0 operations",
+        "            n = -n",
+        "        else:",
+        "            v = waves(v) for each element  # 24 operations",
+        "    x = sum(v * 1/3)",
+        "    v = Solve(m, v, v, transposed=True)",
+        "record if y > 0: x",
+        "stop if n != 0",
+    ]
