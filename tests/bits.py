@@ -20,7 +20,7 @@ from cgraph import Graph, Node
 from cgraph._shared import Array, columns
 from dynamics.equations.state_equation import normalization, state_equation, state_inputs
 from dynamics.equations.substitute import substitute
-from dynamics.integrators.statements import weighted
+from dynamics.integrators.step import weighted
 from dynamics.integrators.tableau import RK4
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import prepare

@@ -5,6 +5,7 @@ import gc
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Generator, Iterator
 from hashlib import sha256
 from pathlib import Path
@@ -104,10 +105,23 @@ def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 
 
 @pytest.fixture
-def ctrl_c() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt even where the tests were started with SIGINT ignored, as background jobs are."""
+def ctrl_c() -> Iterator[Callable[[float], threading.Timer]]:
+    """A function that presses Ctrl-C after so long [s], unless the test is over by then.
+
+    It raises KeyboardInterrupt even where the tests were started with SIGINT ignored, as background jobs are.
+    """
+    main, timers = threading.get_ident(), list[threading.Timer]()
+
+    def after(seconds: float) -> threading.Timer:
+        timers.append(threading.Timer(seconds, lambda: signal.pthread_kill(main, signal.SIGINT)))
+        timers[-1].start()
+        return timers[-1]
+
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
+    yield after
+    for timer in timers:
+        timer.cancel()
+        timer.join()
     signal.signal(signal.SIGINT, before)
 
 

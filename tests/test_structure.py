@@ -42,7 +42,7 @@ LAZY = {
     "cgraph/program/runners/choose_runner.py::runner": "programs are Python only if there is no machine code",
     "cgraph/program/runners/native_runner.py::_side": "a program of one memory does without",
     "dynamics/equations/formulations/formulations.py::_remarks": "loaded when a notebook asks",
-    "dynamics/integrators/momenta.py::momentum_form": "most motions are of velocities",
+    "dynamics/integrators/problem.py::momentum_form": "most motions are of velocities",
     "dynamics/multibody/trees/structure.py::require_values": "one set of values does without",
     "dynamics/multibody/trees/tree_equations.py::torque_derivatives": "most equations do without",
     "dynamics/simulation/run.py::ends": "a trajectory does without",

@@ -107,11 +107,12 @@ class Loop:
         if values.ndim != dimensions or values.shape[0] != count:
             wanted = f"({count},)" if dimensions == 1 else f"({count}, N)"
             raise GraphError(f"x must have shape {wanted}, one row for each input, got {values.shape}")
-        held = self._split.primal.input_names, values[self._held].tolist() if dimensions == 1 else values[self._held]
-        known = self._split.primal.evaluate(dict(zip(*held, strict=True))).values()
         memory = self._runner.memory({"carry": values[self._moving]}, None if dimensions == 1 else values.shape[1])
-        for k, numbers in enumerate(known):
-            self._runner.read(memory, "held")[k] = numbers
+        if self._held:
+            held, register = values[self._held], self._runner.read(memory, "held")
+            named = zip(self._split.primal.input_names, held.tolist() if dimensions == 1 else held, strict=True)
+            for k, numbers in enumerate(self._split.primal.evaluate(dict(named)).values()):
+                register[k] = numbers
         return memory
 
 

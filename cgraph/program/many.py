@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import replace
-from types import MappingProxyType
+from dataclasses import dataclass, field, replace
 
 from ..core.graph import Graph
 from ..operations.table import where
@@ -36,47 +35,38 @@ def many(program: Program) -> Program:
     """
     if not isinstance(program, Program):
         raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
-    return _masked(program, {})
+    return many_keeping(program, program.registers)
 
 
 def many_keeping(program: Program, kept: Iterable[str]) -> Program:
     """`many`, but what is neither kept nor outlives a pass is put back only where something reads it."""
-    after: dict[int, Set[str]] = {}
-    live_registers(program.body, {*kept, *outliving(program)}, after)
-    return _masked(program, after)
-
-
-def _masked(program: Program, after: Mapping[int, Set[str]]) -> Program:
-    """The program under masks.  after: see `Masked`."""
     if all([row_of(each).masked is None for each in program.statements()]):
         return program
-    lengths, own = dict(program.registers), ":"
+    lengths, own, after = dict(program.registers), ":", dict[int, Set[str]]()
     while any([own in name for name in lengths]):
         own += ":"
-    masked = Masked(lengths, own=own, after=after)
+    live_registers(program.body, {*kept, *outliving(program)}, after)
+    masked = Masked(lengths, own, after)
     masked.run(program.body)
     return replace(program, registers=lengths, body=tuple(masked.statements))
 
 
+@dataclass
 class Masked:
     """Statements that change the lanes of a mask alone, when what they write is put back in the others.
 
-    lengths: of all registers; grows.  mask: the register that is 1 in its lanes, else 0; none: all lanes.
-    statements: what has been added.  written: registers to be put back.  after: {id of a statement with bodies: the
-    registers that are read behind them}; of one that is not there all may be.
+    lengths: of all registers; grows.  own: a sign in no name of the program's.  after: {id of a statement with bodies:
+    the registers that are read behind them}.  mask: the register that is 1 in its lanes, else 0; none: all lanes.
+    statements: what has been added.  written: registers to be put back.
     """
 
-    def __init__(
-        self,
-        lengths: dict[str, int],
-        mask: Sequence[str] = (),
-        depth: int = 0,
-        own: str = ":",
-        after: Mapping[int, Set[str]] = MappingProxyType({}),
-    ) -> None:
-        self.lengths, self.mask, self._depth, self._own, self.after = lengths, tuple(mask), depth, own, after
-        self.statements: list[Statement] = []
-        self.written: dict[str, None] = {}
+    lengths: dict[str, int]
+    own: str
+    after: Mapping[int, Set[str]]
+    mask: tuple[str, ...] = ()
+    depth: int = 0
+    statements: list[Statement] = field(default_factory=list)
+    written: dict[str, None] = field(default_factory=dict)
 
     def run(self, statements: Sequence[Statement]) -> None:
         """Statements, one after another."""
@@ -94,17 +84,17 @@ class Masked:
 
     def body(self, statement: Statement, statements: Sequence[Statement], mask: str) -> tuple[Statement, ...]:
         """A body of a statement in the lanes of a mask: what it writes is kept before, and put back in the others."""
-        inner = Masked(self.lengths, (mask,), self._depth + 1, self._own, self.after)
+        inner = replace(self, mask=(mask,), depth=self.depth + 1, statements=[], written={})
         inner.run(statements)
-        read = self.after.get(id(statement), inner.written)
-        before = {name: inner.register(f"{name} before", self.lengths[name]) for name in inner.written if name in read}
+        back = [name for name in inner.written if name in self.after[id(statement)]]
+        before = {name: inner.register(f"{name} before", self.lengths[name]) for name in back}
         keep = [copied(name, kept) for name, kept in before.items()]
         choose = [Map(_CHOSEN, (mask, name, kept), (name,)) for name, kept in before.items()]
         return (*keep, *inner.statements, *choose)
 
     def register(self, name: str, length: int = 1) -> str:
         """A register for a body at this depth, which others at this depth share."""
-        own = f"{name}{self._own}{self._depth}"
+        own = f"{name}{self.own}{self.depth}"
         self.lengths.setdefault(own, length)
         return own
 

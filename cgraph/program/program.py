@@ -51,8 +51,8 @@ class Program:
             for name in names:
                 length_of(self.registers, where, name)
         require_once("the feed", self.feed)
-        for what, number in (("record_if", self.record_if), ("stop", self.stop)):
-            if number is not None:
+        for what in ("record_if", "stop"):
+            if (number := getattr(self, what)) is not None:
                 require_length(self.registers, what, number, 1)
         for statement in self.statements():
             row = row_of(statement)
@@ -112,12 +112,9 @@ class Program:
 
     def graphs(self) -> list[Graph]:
         """The graphs that statements run, each once."""
-        graphs: dict[int, Graph] = {}
-        for statement in self.statements():
-            if name := row_of(statement).graph:
-                graph = getattr(statement, name)
-                graphs.setdefault(id(graph), graph)
-        return list(graphs.values())
+        named = [(statement, row_of(statement).graph) for statement in self.statements()]
+        graphs = [getattr(statement, name) for statement, name in named if name]
+        return list({id(graph): graph for graph in graphs}.values())
 
 
 def whole_graph(program: Program, x: str) -> Graph | None:
@@ -144,10 +141,8 @@ def live_registers(statements: Sequence[Statement], read: Set[str], after: dict[
     for statement in reversed(statements):
         row, bodies = row_of(statement), bodies_of(statement)
         if bodies:  # which may run no time at all, or again
-            live |= {
-                *names_in(statement, row.reads),
-                *[name for body in bodies for name in live_registers(body, set(), {})],
-            }
+            inside = [name for body in bodies for name in live_registers(body, set(), {})]
+            live |= {*names_in(statement, row.reads), *inside}
             after[id(statement)] = frozenset(live)
             for body in bodies:
                 live_registers(body, live, after)

@@ -72,21 +72,21 @@ ROWS = [  # read by columns: kind, reads, writes; in Python, check; as machine c
         **_bodies("control_rules", "fixed_point", "masked_while"),
     ),
     StatementRow(
-        memory.Take, ("source",), ("target",), memory.run_take, memory.check_take,
-        text=memory.take_text, beside=memory.run_take, **_derivatives("linear_rules", "take", "moved"),
+        memory.Take, ("source",), ("target",), memory.run_numbers, memory.check_numbers,
+        text=memory.numbers_text, beside=memory.run_numbers, **_derivatives("linear_rules", "take", "moved"),
     ),
     StatementRow(
-        memory.Scatter, ("source", "target"), ("target",), memory.run_scatter, memory.check_scatter,
-        text=memory.scatter_text, beside=memory.run_scatter, **_derivatives("linear_rules", "scatter", "moved"),
+        memory.Scatter, ("source", "target"), ("target",), memory.run_numbers, memory.check_numbers,
+        text=memory.numbers_text, beside=memory.run_numbers, **_derivatives("linear_rules", "scatter", "moved"),
     ),
     StatementRow(
-        memory.Push, ("stack", "count", "rows"), ("stack", "count"), memory.run_push, memory.check_stack,
-        text=memory.push_text, beside=memory.run_push, masked=_later("many", "masked_push"),
+        memory.Push, ("stack", "count", "rows"), ("stack", "count"), memory.run_stack, memory.check_stack,
+        text=memory.stack_text, beside=memory.run_stack, masked=_later("many", "masked_push"),
         **_derivatives("linear_rules", "push", "moved"),
     ),
     StatementRow(
-        memory.Pop, ("stack", "count"), ("count", "rows"), memory.run_pop, memory.check_stack,
-        text=memory.pop_text, beside=memory.run_pop, **_derivatives("linear_rules", "pop", "moved"),
+        memory.Pop, ("stack", "count"), ("count", "rows"), memory.run_stack, memory.check_stack,
+        text=memory.stack_text, beside=memory.run_stack, **_derivatives("linear_rules", "pop", "moved"),
     ),
 ]
 # fmt: on

@@ -47,8 +47,7 @@ class Functions:
         arithmetic = self.arithmetic.unfused if exact else self.arithmetic
         pointers = [f"%in{k}" for k in range(len(registers))]
         places = [
-            [f"{arithmetic.type}, ptr {pointer}, i64 {k}" for k in range(length)]
-            for pointer, length in zip(pointers, registers, strict=True)
+            _places(arithmetic.type, pointer, length) for pointer, length in zip(pointers, registers, strict=True)
         ]
         x, y = ([place for k in which for place in places[k]] for which in (reads, writes))
         known = set(x)
@@ -97,20 +96,18 @@ class Functions:
             with ir.loop(0, end, arithmetic.lanes if in_vectors else 1) as i:
                 for k in gathered:
                     ir.store_at(ir.value(f"call {vector} @{gather}(ptr {ir.at(found[k], i, one)})"), brought[k])
-                x = _places(one, common, shared)
-                pointers = []
-                for k, length in enumerate(inputs):
-                    pointers.append(brought.get(k, found[k] if k in same else ir.at(found[k], i, one)))
-                    step = 0 if k in same else count
-                    x += [f"{one}, ptr {pointers[-1]}, i64 {at * step}" for at in range(max(1, length // count))]
+                sources = [brought.get(k, at if k in same else ir.at(at, i, one)) for k, at in enumerate(found)]
                 targets = [ir.at(f"%out{k}", i, one) for k in range(len(outputs))]
+                x = [place for at, length in zip(common, shared, strict=True) for place in _places(one, at, length)]
+                for k, (at, length) in enumerate(zip(sources, inputs, strict=True)):
+                    x += _places(one, at, max(1, length // count), 0 if k in same else count)
                 y = [
-                    f"{one}, ptr {target}, i64 {at * count}"
-                    for target, length in zip(targets, outputs, strict=True)
-                    for at in range(length // count)
+                    place
+                    for at, length in zip(targets, outputs, strict=True)
+                    for place in _places(one, at, length // count, count)
                 ]
                 uniform = sum(shared) if in_vectors else 0
-                self._body(ir, name, graph, x, y, [*common, *pointers, *targets], uniform=uniform)
+                self._body(ir, name, graph, x, y, [*common, *sources, *targets], uniform=uniform)
 
         key = ("map", id(graph), shared, inputs, outputs, count, tuple(gathered), asked)
         return self._define(key, "map", text, arithmetic, first + len(inputs) + asked, len(outputs))
@@ -156,22 +153,17 @@ class Functions:
 
     def take(self, table: Sequence[int], places: Sequence[int] = ()) -> str:
         """y[i] = x[table[i]], or y[places[i]]; where these are all, in order, they are left out."""
-        size = len(table)
-        places = () if tuple(places) == tuple(range(size)) else places
+        tables = [table] if tuple(places) in ((), tuple(range(len(table)))) else [table, places]
 
         def text(ir: FunctionWriter, name: str) -> None:
-            def number(kind: str, numbers: Sequence[int], i: str) -> str:
+            for k, numbers in enumerate(tables):
                 listed = ", ".join(f"i64 {each}" for each in numbers)
-                constant = f"@{name}.{kind} = internal unnamed_addr constant [{size} x i64] [{listed}]"
-                self.definitions.append(constant)
-                return ir.load_at(ir.at(f"@{name}.{kind}", i, "i64"), "i64")
+                self.definitions.append(f"@{name}.{k} = internal unnamed_addr constant [{len(table)} x i64] [{listed}]")
+            with ir.loop(0, len(table)) as i:
+                source, *target = [ir.load_at(ir.at(f"@{name}.{k}", i, "i64"), "i64") for k in range(len(tables))]
+                ir.store_at(ir.load_at(ir.at("%in0", source)), ir.at("%out0", target[0] if target else i))
 
-            with ir.loop(0, size) as i:
-                taken = ir.load_at(ir.at("%in0", number("table", table, i)))
-                ir.store_at(taken, ir.at("%out0", number("places", places, i) if places else i))
-
-        key = ("take", tuple(table), tuple(places))
-        return self._define(key, "take", text, self.arithmetic, 1, 1)
+        return self._define(("take", *map(tuple, tables)), "take", text, self.arithmetic, 1, 1)
 
     def _body(
         self,
@@ -210,13 +202,9 @@ class Functions:
         return name
 
 
-def _places(t: str, pointers: Sequence[str], lengths: Lengths) -> list[str]:
-    """Places of the numbers of registers, end to end."""
-    return [
-        f"{t}, ptr {pointer}, i64 {at}"
-        for pointer, length in zip(pointers, lengths, strict=True)
-        for at in range(length)
-    ]
+def _places(t: str, pointer: str, count: int, step: int = 1) -> list[str]:
+    """Places of so many numbers of a register."""
+    return [f"{t}, ptr {pointer}, i64 {k * step}" for k in range(count)]
 
 
 class Writer(FunctionWriter):

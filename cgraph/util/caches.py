@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from functools import lru_cache, wraps
-from typing import TYPE_CHECKING, Concatenate, ParamSpec, Protocol, TypeVar, cast
+from threading import RLock
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 from weakref import WeakSet, ref
 
 if TYPE_CHECKING:
@@ -100,6 +101,27 @@ def kept_by_first(
         if found is results:
             found = results.known[key] = function(first, *others, **named)
         return cast("Result", found)
+
+    return call
+
+
+def made_once(method: Callable[..., Result]) -> Callable[..., Result]:
+    """The method, whose results an object keeps as parts of itself, by hashable arguments.
+
+    They are made once, by whichever thread asks first, and stay as long as the object does.
+    """
+
+    @wraps(method)
+    def call(self: Any, *arguments: Hashable) -> Result:
+        try:
+            return self._made[method, arguments]  # type: ignore[no-any-return]
+        except (AttributeError, KeyError):
+            own: dict[str, Any] = self.__dict__
+            with own.setdefault("_making", RLock()):
+                made = own.setdefault("_made", {})
+                if (method, arguments) not in made:
+                    made[method, arguments] = method(self, *arguments)
+                return cast("Result", made[method, arguments])
 
     return call
 

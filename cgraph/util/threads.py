@@ -21,8 +21,6 @@ def thread_count(threads: int | None) -> int:
     >>> thread_count(3)
     3
     """
-    if type(threads) is int and threads > 0:
-        return threads
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:

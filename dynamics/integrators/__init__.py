@@ -7,31 +7,37 @@ from importlib import import_module
 
 from cgraph._shared import doors, memo
 
-from .dop853 import DOP853
 from .explicit import explicit_step
-from .method import Method
-from .momenta import Mechanics, in_form, mechanics, momentum_form
+from .method import Method as Method
 from .problem import (
-    Problem,
-    derive,
-    force,
-    quantity,
-    quantity_inputs,
-    state_arguments,
-    state_jacobian,
-    time_derivative,
-    total_energy,
+    Problem as Problem,
+    derive as derive,
+    force as force,
+    in_form as in_form,
+    quantity as quantity,
+    quantity_inputs as quantity_inputs,
+    state_arguments as state_arguments,
+    time_derivative as time_derivative,
+    total_energy as total_energy,
 )
-from .statements import call, each, total
-from .step import Step
-from .step_control import measured
-from .symplectic_tableaus import COMPOSITIONS, PARTITIONED, Composition, Partitioned, gauss
-from .tableau import TABLEAUS, Tableau
+from .step import Step as Step, call as call, each as each, total as total
+from .step_control import measured as measured
+from .tableau import (
+    COMPOSITIONS,
+    DOP853,
+    PARTITIONED,
+    TABLEAUS as TABLEAUS,
+    Composition,
+    Partitioned,
+    Tableau as Tableau,
+    gauss,
+)
 
 TYPE_CHECKING = False  # as a checker knows it
 
 if TYPE_CHECKING:
-    from .jacobian_statements import jacobian_statements
+    from .jacobian_statements import jacobian_statements as jacobian_statements
+    from .symplectic import mechanics as mechanics
 
 __getattr__, __dir__ = doors(__name__, __file__)
 TAYLOR_ORDER, LEAST_ORDER = 22, 4  # of a tolerance of 2^-52, and of large ones
@@ -40,10 +46,8 @@ MOST_STAGES = 12  # of Gauss's methods: order 24, beyond which float64 gains not
 
 def runge_kutta(tableau: Tableau) -> Method:
     """An explicit Runge-Kutta method: equal steps, or steps by error where the tableau has weights of an estimate."""
-    step = partial(explicit_step, tableau)
-    if tableau.error:
-        return Method(tableau.order, step, adaptive=True, degree=len(tableau.interpolant[0]))
-    return Method(tableau.order, step)
+    step, degree = partial(explicit_step, tableau), len(tableau.interpolant[0])
+    return Method(tableau.order, step, adaptive=bool(tableau.error), degree=degree)
 
 
 def _later(file: str, name: str, *given: object, **usual: int) -> Callable[..., Step]:
@@ -64,21 +68,18 @@ class Methods(dict[str, Method]):
     """Methods by name: those that are listed, and "gauss<2 s>" for any number s of stages up to `MOST_STAGES`."""
 
     def __missing__(self, name: str) -> Method:
-        if not _names_gauss(name):
-            raise KeyError(name)
-        return _gauss(int(name.removeprefix("gauss")) // 2)
+        return _gauss(GAUSS[name])
 
     def __contains__(self, name: object) -> bool:
-        return super().__contains__(name) or (isinstance(name, str) and _names_gauss(name))
+        return super().__contains__(name) or name in GAUSS
+
+
+GAUSS = {f"gauss{2 * stages}": stages for stages in range(1, MOST_STAGES + 1)}
 
 
 @memo(MOST_STAGES)
 def _gauss(stages: int) -> Method:
     return _symplectic(gauss(stages))
-
-
-def _names_gauss(name: str) -> bool:
-    return name in [f"gauss{2 * stages}" for stages in range(1, MOST_STAGES + 1)]
 
 
 def _taylor_order(rtol: float) -> int:
@@ -106,35 +107,6 @@ METHODS: dict[str, Method] = Methods(
             order_at=_taylor_order,
         ),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
-        **{
-            name: Method(each.order, _later("symplectic", "composed_step", each)) for name, each in COMPOSITIONS.items()
-        },
+        **{name: _symplectic(method, "composed_step") for name, method in COMPOSITIONS.items()},
     }
 )
-
-__all__ = [
-    "METHODS",
-    "TABLEAUS",
-    "Mechanics",
-    "Method",
-    "Problem",
-    "Step",
-    "Tableau",
-    "call",
-    "derive",
-    "each",
-    "force",
-    "in_form",
-    "jacobian_statements",
-    "measured",
-    "mechanics",
-    "momentum_form",
-    "quantity",
-    "quantity_inputs",
-    "runge_kutta",
-    "state_arguments",
-    "state_jacobian",
-    "time_derivative",
-    "total",
-    "total_energy",
-]

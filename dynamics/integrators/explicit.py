@@ -11,8 +11,7 @@ from cgraph import Node
 from cgraph.extend import Call, If, Statement, copied
 
 from .problem import Problem
-from .statements import Values, advanced, call, compensated, count, each, stage_time, total, used, weighted
-from .step import Step
+from .step import Step, Values, advanced, call, compensated, count, each, numbered, stage_time, total, weighted
 from .step_control import SAFETY, SCALE, nonfinite, scale
 from .tableau import Tableau, real_stability
 
@@ -25,11 +24,10 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
         body += _stage(problem, k, tableau.c[k], tableau.a[k], ("at", "at_t"))
     if not tableau.error:
         return Step(body=[*body, advanced("x_new", tableau.b)], rates=rates)
-    slopes, weights = used(tableau.b, "slope")
 
     def arrival(x: Node, rounding: Node, h: Node, *slopes: Node) -> Values:
         """What rounding took off the step before is added."""
-        x_new, rounding_new = compensated(x, h * weighted(slopes, weights) + rounding)
+        x_new, rounding_new = compensated(x, h * weighted(slopes, tableau.b) + rounding)
         return {"x_new": x_new, "rounding_new": rounding_new}
 
     dense: list[Statement] = []
@@ -37,7 +35,7 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
         dense += _stage(problem, k, c, row, ("inside", "inside_t"))
     dense += [_power(k, row) for k, row in enumerate(zip(*tableau.interpolant, strict=True), start=1)]
     return Step(
-        body=[*body, each(arrival, "x", "rounding", "h", *slopes)],
+        body=[*body, each(arrival, "x", "rounding", "h", *numbered("slope", stages))],
         rates=rates,
         kept=[copied("rounding_new", "rounding")],
         fixed=("rounding", "rounding_new"),
@@ -61,22 +59,19 @@ def _slope(problem: Problem, k: int, c: float, at: tuple[str, str]) -> list[Stat
 
 def _power(k: int, weights: Sequence[float]) -> Statement:
     """The coefficient of s^k in the dense output of an accepted step."""
-    slopes, parts = used(weights, "slope")
-    return each(lambda h, *slopes: {f"dense{k}": h * weighted(slopes, parts)}, "h", *slopes)
+    slopes = numbered("slope", len(weights))
+    return each(lambda h, *slopes: {f"dense{k}": h * weighted(slopes, weights)}, "h", *slopes)
 
 
 def _error(tableau: Tableau, problem: Problem) -> list[Statement]:
     """Register `error`, and the slope at the end: where no estimate needs it, of a step within the tolerance alone."""
     stages, m = len(tableau.b), problem.size
-    sums = [f"sum{k}" for k in range(len(tableau.error))]
-    numbers = [k for k in range(stages + 1) if any([weights[k] for weights in tableau.error])]
+    sums = numbered("sum", len(tableau.error))
 
-    def squares(*values: Node) -> Values:
+    def squares(h: Node, x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node, *slopes: Node) -> Values:
         """Of h * (sum of weight * slope) / scale, for each estimate; NaN if x_new is infinite."""
-        (*sizes, h), slopes = values[: len(SCALE) + 1], values[len(SCALE) + 1 :]
-        size = scale(*sizes)
-        parts = [h * weighted(slopes, [weights[k] for k in numbers]) / size for weights in tableau.error]
-        finite = sizes[1] - sizes[1]
+        size, finite = scale(x, x_new, rtol, atol, leap), x_new - x_new
+        parts = [h * weighted(slopes, weights) / size for weights in tableau.error]
         return {name: part * part + finite for name, part in zip(sums, parts, strict=True)}
 
     def estimate(first: Node, *others: Node) -> Values:
@@ -88,12 +83,12 @@ def _error(tableau: Tableau, problem: Problem) -> list[Statement]:
         return {"error": error}
 
     slope = _slope(problem, stages, 1.0, ("x_new", "at_t"))
-    known = [total(squares, *SCALE, "h", *[f"slope{k}" for k in numbers]), call(estimate, *sums)]
+    known = [total(squares, "h", *SCALE, *numbered("slope", stages + 1)), call(estimate, *sums)]
     finite = [
         nonfinite("nonfinite_rate", f"slope{stages}"),
         call(lambda error, nonfinite_rate: {"error": error + nonfinite_rate}),
     ]
-    if stages in numbers:
+    if any([weights[-1] for weights in tableau.error]):
         return [*slope, *known, *finite]
     return [*known, call(lambda error: {"within": error <= 1.0}), If("within", (*slope, count(1), *finite))]
 
@@ -105,14 +100,13 @@ def _at_limit(tableau: Tableau) -> list[Statement]:
     """
     if tableau.c[-1] != 1.0:
         return []
-    stages, limit = len(tableau.b), real_stability(tableau)
+    stages = len(tableau.b)
 
     def change(a: Node, b: Node, *sizes: Node) -> Values:
         part = (a - b) / scale(*sizes)
         return {"rise": part * part}
 
-    def counted(h: Node, rise: Node, reach: Node, at_limit: Node) -> Values:
-        return {"at_limit": at_limit + (h * h * rise > (SAFETY * limit) ** 2 * reach)}
-
+    most = (SAFETY * real_stability(tableau)) ** 2
+    count = call(lambda h, rise, reach, at_limit: {"at_limit": at_limit + (h * h * rise > most * reach)})
     rise = total(change, f"slope{stages}", f"slope{stages - 1}", *SCALE)
-    return [rise, replace(rise, inputs=("x_new", "at", *SCALE), outputs=("reach",)), call(counted)]
+    return [rise, replace(rise, inputs=("x_new", "at", *SCALE), outputs=("reach",)), count]

@@ -7,7 +7,7 @@ from cgraph._shared import CompressedJacobian, kept_by_first
 from cgraph.extend import Call, Factor, Map, Program, Statement, compressed_jacobian
 
 from .problem import Problem, state_jacobian
-from .statements import call
+from .step import call
 
 
 def jacobian_statements(problem: Problem) -> list[Statement]:

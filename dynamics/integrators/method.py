@@ -12,8 +12,7 @@ from cgraph._shared import memo
 from cgraph.extend import Program
 
 from .problem import Problem
-from .statements import Values, call
-from .step import Step, arriving, rate_calls, with_registers
+from .step import Step, Values, arriving, call, rate_calls, with_registers
 from .step_control import HERMITE, chosen, first_pass, nonfinite
 
 KEPT_METHODS = 32  # methods of an order

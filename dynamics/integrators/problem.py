@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import is_finite, kept_by_first, memo
+from cgraph._shared import is_finite, kept_by_first, memo, require_choice
 from cgraph.extend import topological
 
 from ..equations.constraints.constraint_rank import independent_rows
 from ..equations.constraints.projection import projection
 from ..equations.energies import energy
-from ..equations.state_equation import normalization, state_inputs, with_multipliers
+from ..equations.equations_of_motion import momentum
+from ..equations.state_equation import FORMS, normalization, state_inputs, with_multipliers
 from ..equations.substitute import substitute
 from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Equations, Model, as_equations
@@ -114,16 +115,10 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
     if system is None:
         equations: tuple[Any, ...] = (model.ode and model.ode.rates,)
     else:
-        moving = system.kinematics
-        equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping)
-        equations += (
-            system.lengths,
-            system.velocities,
-            *moving.q_dot,
-            moving.quasi and moving.quasi.normalized,
-            moving.groups,
-        )
-        equations += (tuple(system.constraints.names), system.constraints.positions, system.constraints.velocities)
+        moving, held = system.kinematics, system.constraints
+        equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping, system.lengths)
+        equations += (system.velocities, *moving.q_dot, moving.quasi and moving.quasi.normalized, moving.groups)
+        equations += (tuple(held.names), held.positions, held.velocities)
     numbers = tuple([(name, float(value).hex()) for name, value in bound.items()])  # 0.0 and -0.0 stay apart
     key = (*equations, inputs.states, inputs.applied, tuple(inputs.parameters), numbers)
     return _derived(_Request(key, model, bound))
@@ -147,13 +142,10 @@ def _derived(request: _Request) -> Problem:
         components = [f"coordinate {name!r}" for name in system.coordinates]
         rated = set(system.coordinates)
         components += [f"velocity {'of ' if name in rated else ''}{name!r}" for name in system.velocities]
-    equation, held = with_multipliers(model)
-    rate = _bind(equation, inputs.states, parameters, bound)
-    multipliers = None if held is None else _bind(held, inputs.states, parameters, bound)
-    step = None if system is None else projection(system)
-    projected = None if step is None else _bind(step, inputs.states, parameters, bound)
-    whole = normalization(model)
-    graphs = (rate, whole, projected, multipliers)
+    every = (*with_multipliers(model), None if system is None else projection(system))
+    rate, multipliers, step = [graph and _bind(graph, inputs.states, parameters, bound) for graph in every]
+    assert rate is not None
+    graphs = (rate, normalization(model), step, multipliers)
     return Problem(model, inputs.states, tuple(components), parameters, bound, *graphs, system)
 
 
@@ -232,16 +224,10 @@ def quantity(
 
 def state_arguments(problem: Problem) -> tuple[Any, ...]:
     """Arguments of a function of the state: (q, qd, t, p) as nodes, or (x, t, p) of a first-order system."""
-    p = Parameters(())
-    p.update(_parameters(problem))  # a copy, which a caller may change
+    p = Parameters(state_inputs(problem.model).parameters)
     if problem.system is None:
         return cg.variables(list(problem.states)), cg.variable(TIME), p
     return problem.system.q, problem.system.qd, problem.system.t, p
-
-
-@kept_by_first
-def _parameters(problem: Problem) -> Parameters:
-    return Parameters(state_inputs(problem.model).parameters)
 
 
 @kept_by_first
@@ -258,3 +244,36 @@ def quantity_inputs(problem: Problem) -> list[Node]:
 def reaches(nodes: Iterable[Node], variables: Iterable[Node]) -> bool:
     """Whether any of the nodes depends on any of the variables."""
     return not set(variables).isdisjoint(topological(nodes))
+
+
+def in_form(problem: Problem, form: str) -> Problem:
+    """The problem that the steps of a run are of. Raises ValueError for a form that it has not."""
+    if require_choice("form", form, FORMS) == "velocity":
+        return problem
+    return momentum_form(problem)
+
+
+@kept_by_first
+def momentum_form(problem: Problem) -> Problem:
+    """Problem of the motion in q and p = dL/dqd.
+
+    Raises ValueError for a first-order system; ConstraintError, SingularMassMatrixError and ValueError as
+    `hamilton_equations`.
+    """
+    from ..equations.momentum.hamiltonian import hamilton_equations, missing_momenta, velocities
+
+    system = problem.system
+    if system is None:
+        raise ValueError('form="momentum" needs a Lagrangian, which a system of first order does not have')
+    states = (*problem.states[: problem.nq], *[f"p{i}" for i in range(system.n)])
+    names = [f"momentum of {name!r}" for name in system.velocities]
+    missing = missing_momenta(system)
+    return replace(
+        problem,
+        states=states,
+        components=(*problem.components[: problem.nq], *names),
+        rate=problem.bind(states, hamilton_equations(system)),
+        velocities=problem.bind(states, velocities(system)),
+        momentum=problem.bind(problem.states, momentum(system)),
+        missing=missing and problem.bind(states, missing),
+    )

@@ -20,8 +20,7 @@ from cgraph.extend import Call, Factor, FixedPoint, If, Solve, Statement, added,
 
 from .jacobian_statements import identity, jacobian_statements
 from .problem import Problem
-from .statements import Values, call, combined, count, each, stage_time, total, weighted
-from .step import Step
+from .step import Step, Values, call, combined, count, each, numbered, stage_time, total, weighted
 from .step_control import SCALE, measured, nonfinite, scale
 from .tableau import RowOfWeights
 
@@ -46,8 +45,8 @@ FAST = 1e-3  # rate of convergence, below which the Jacobian serves the next ste
 LONGER_STEP = 1.1  # times as long as the one before: a step up to which is as long, since that saves its factorization
 SAME_LENGTH = 1e-10  # relative: lengths of steps that are the same but for the rounding of the time
 SMALL_COMPONENT = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
-Z, W, F = (tuple([f"{name}{k}" for k in range(3)]) for name in "ZWF")
-POWERS, CHANGES = ("power1", "power2", "power3"), ("right0", "F1", "F2")  # of the guess; of W in a turn
+Z, W, F = (numbered(name, 3) for name in "ZWF")
+POWERS, CHANGES = numbered("power", 3, 1), ("right0", "F1", "F2")  # of the guess; of W in a turn
 
 
 def _transformation() -> tuple[list[RowOfWeights], list[RowOfWeights]]:
@@ -278,18 +277,18 @@ def _estimate(problem: Problem) -> list[Statement]:
         right = each(lambda rate, h, *z: {"error_vector": rate + weighted(z, _ERROR) / h}, rate, "h", *Z)
         return [right, Solve("real", "pivots", "error_vector"), *measured("error_vector", problem.size)]
 
-    def doubt(error: Node, accepted: Node, h_old: Node) -> Values:
-        return {"again": (error > 1.0) * cg.maximum(1.0 - accepted, cg.equal(h_old, 0.0))}
-
-    def halved(error: Node, converged: Node, nonfinite_real: Node, nonfinite_complex: Node) -> Values:
-        return {"error": cg.where(converged, error + nonfinite_real + nonfinite_complex, HALVES)}
-
     rate = Call(problem.rate, ("at", "t", "p"), ("F0",))
     return [
         nonfinite("nonfinite_real", "real"),
         nonfinite("nonfinite_complex", "complex"),
         *filtered("rate"),
-        call(doubt),
+        call(
+            lambda error, accepted, h_old: {"again": (error > 1.0) * cg.maximum(1.0 - accepted, cg.equal(h_old, 0.0))}
+        ),
         If("again", (added("x", "error_vector", "at"), rate, *filtered("F0"))),
-        call(halved),
+        call(
+            lambda error, converged, nonfinite_real, nonfinite_complex: {
+                "error": cg.where(converged, error + nonfinite_real + nonfinite_complex, HALVES)
+            }
+        ),
     ]

@@ -16,8 +16,7 @@ from cgraph.extend import Call, Factor, Map, Solve, Statement, added
 
 from .jacobian_statements import identity, jacobian_statements
 from .problem import Problem, time_derivative
-from .statements import Values, combined, each, stage_time, used, weighted
-from .step import Step
+from .step import Step, Values, combined, each, numbered, stage_time, weighted
 from .step_control import measured, nonfinite
 from .tableau import RowOfWeights
 
@@ -80,7 +79,7 @@ RODAS5P = Rosenbrock(
 
 def rodas_step(problem: Problem, method: Rosenbrock = RODAS5P) -> Step:
     """The step of Rodas5P, or of another method of this form."""
-    stages = [f"U{k}" for k in range(len(method.c))]
+    stages = numbered("U", len(method.c))
     body: list[Statement] = [
         each(lambda unit, h, jacobian: {"matrix": unit / (method.gamma * h) - jacobian}),
         Factor("matrix", "pivots"),
@@ -113,23 +112,17 @@ def rodas_step(problem: Problem, method: Rosenbrock = RODAS5P) -> Step:
 
 def _state(weights: RowOfWeights) -> Map:
     """at = x + sum of weight * U."""
-    stages, parts = used(weights, "U")
-    return each(lambda x, *u: {"at": x + weighted(u, parts) if u else x}, "x", *stages)
+    return each(lambda x, *u: {"at": x + weighted(u, weights) if u else x}, "x", *numbered("U", len(weights)))
 
 
 def _right(method: Rosenbrock, problem: Problem, k: int) -> Map:
     """The right-hand side of stage k, in register U{k}."""
-    stages, parts = used(method.slopes[k], "U")
-    timed = ["time_slope"] if problem.timed and method.d[k] else []
 
-    def right(rate: Node, h: Node, *others: Node) -> Values:
-        u, time_slope = others[: len(stages)], others[len(stages) :]
-        result = rate + weighted(u, parts) / h if u else rate
-        for slope in time_slope:
-            result = result + method.d[k] * (h * slope)
-        return {f"U{k}": result}
+    def right(rate: Node, h: Node, time_slope: Node, *u: Node) -> Values:
+        result = rate + weighted(u, method.slopes[k]) / h if u else rate
+        return {f"U{k}": result + method.d[k] * (h * time_slope) if problem.timed and method.d[k] else result}
 
-    return each(right, "rate", "h", *stages, *timed)
+    return each(right, "rate", "h", "time_slope", *numbered("U", k))
 
 
 def _dense(method: Rosenbrock, stages: Sequence[str]) -> list[Statement]:

@@ -1,12 +1,7 @@
 """Chosen steps: a method's step, tried until its error is within the tolerance; the registers, and step control.
 
-A pass is a trial of one step, from t to t_new = t + h exactly. Registers: x the state, t, p the parameters,
-evaluations, as with equal steps; `h` the step, negative for a run back in time; `tried` its size before t_new was
-rounded, `next` the size to try next, `max_step` and `min_step` their limits; `end` where to stop; rtol, and atol for
-each component of the state; accepted (1 or 0), status; rejected, a count; `error`, the estimate of the last trial, 1
-at the tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; `at_limit`, accepted steps
-at the stability limit of an explicit method; and of the last accepted step t_old, x_old and, for its dense output,
-dense1, ..
+A pass is a trial of one step, from t to t_new = t + h exactly, over the registers that `Method` lists. `tried` is its
+size before t_new was rounded; `fresh` is 1 before the first pass.
 
 A run begins with `anew` at 1, and goes on to a trial once it is set out, see `simulation.steps.first_step`: registers
 that a step hands on to the next are 0 then. `search` is positive while a first step is looked for: a trial then is none
@@ -32,8 +27,7 @@ from cgraph import Node
 from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
 
 from .problem import Problem
-from .statements import Values, call, count, each, total
-from .step import Step, rate_calls, with_registers
+from .step import Step, Values, call, count, each, rate_calls, total, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 5.0  # factors from one step to the next
@@ -169,10 +163,8 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     a trial that was too long the rates are those of its end, so that all begins again.
     """
     polynomial = (step.dense or _hermite(problem)) if dense else ()
-    statements = [*step.error, *(step.handed or ()), *polynomial]
-    lengths = with_registers(step, registers(problem), *statements)
-    if dense:
-        lengths |= dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size)
+    lengths = with_registers(step, registers(problem), *step.error, *(step.handed or ()), *polynomial)
+    lengths |= dict.fromkeys([f"dense{k + 1}" for k in range(degree if dense else 0)], problem.size)
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
     first, again = ([*step.start, *rates], prepare) if step.handed is not None else (step.start, [*rates, *prepare])
     body = _forgotten(step, problem)
@@ -191,18 +183,11 @@ def _forgotten(step: Step, problem: Problem) -> list[Statement]:
     """Registers that are 0 before the first trial: those that a step reads before it is sure to write them."""
     first: dict[str, None] = {}
     written = {*registers(problem)}
-    for each_one in (
-        *step.start,
-        *step.rates,
-        *step.prepare,
-        *step.body,
-        *step.error,
-        *step.kept,
-        *(step.handed or ()),
-    ):
-        reads, writes = effects([each_one])
+    before = (*step.start, *step.rates, *step.prepare, *step.body)
+    for statement in (*before, *step.error, *step.kept, *(step.handed or ())):
+        reads, writes = effects([statement])
         first |= {name: None for name in reads if name not in written}
-        if not STATEMENTS[type(each_one)].bodies:  # which may run no time at all
+        if not STATEMENTS[type(statement)].bodies:  # which may run no time at all
             written |= {*writes}
     return [If("anew", tuple([Map(ZERO, (name,), (name,)) for name in (*first, "anew")]), seldom=True)]
 

@@ -23,23 +23,105 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import reduce
+from typing import NamedTuple
 
 import cgraph as cg
-from cgraph import Node
-from cgraph.extend import Call, FixedPoint, Map, Statement, added, copied
+from cgraph import Graph, Node
+from cgraph._shared import kept_by_first
+from cgraph.extend import (
+    Builder,
+    Call,
+    FixedPoint,
+    Map,
+    SingularError,
+    Statement,
+    added,
+    building,
+    copied,
+    cotangents,
+    solve_nodes,
+)
 
-from ..systems.arguments import TIME
-from .momenta import mechanics
+from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError
+from ..systems.arguments import TIME, new_variables
+from ..systems.system import System
 from .problem import Problem, reaches
-from .statements import Values, call, compensated, count, each, stage_time, total, used, weighted
-from .step import Step
-from .symplectic_tableaus import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
+from .step import Step, Values, call, compensated, count, each, numbered, stage_time, total, weighted
+from .tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
 
 TURNS = 60.0  # of the iteration for the stages, at most
 CONVERGED = 2.0**-53  # a change below this, relative, is rounding
 DIVERGED = 1e-9  # one above this, when the turns are over, is no convergence: the step is too long
 REPEATS = 8  # Newton steps for the velocity of a momentum that is not linear in it
 ONCE = Composition(2, (1.0,))
+
+
+class Mechanics(NamedTuple):
+    """A mechanical system in q and p = dL/dqd. Inputs of the graphs: those named here, then t, parameters."""
+
+    momentum: Graph  # (q, qd) -> p
+    force: Graph  # (q, qd) -> p_dot = dL/dq + tau + forces - damping qd
+    velocity: Graph  # (q, qd, p, t, parameters, singular) -> qd, nearer to the velocity that belongs to p: a step of
+    # Newton, exact when K is quadratic in qd; and singular, if it was 0: 0 where M is positive definite, else
+    # 1 + the index of a coordinate without inertia
+    quadratic: bool  # the momenta are linear in the velocities: M does not depend on them
+    separable: bool  # p = M qd with a constant M, and the forces do not depend on the velocities
+
+
+@kept_by_first
+def mechanics(problem: Problem) -> Mechanics:
+    """The graphs of momenta of a problem.
+
+    Raises ValueError for a system that has none, of first order, with quasi-velocities or with constraints;
+    SingularMassMatrixError for a coordinate without inertia.
+    """
+    system = problem.system
+    if system is None or not problem.canonical:
+        raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
+    build = Builder()
+    p = new_variables("p", system.n, system.parameters)
+    bars = cotangents({system.lagrangian: cg.constant(1.0)}, [*system.q, *system.qd], build)
+    slopes, momenta = bars[: system.n], bars[system.n :]
+    with building(build):
+        parts = zip(slopes, system.tau, system.forces, system.damping, system.qd, strict=True)
+        force = [slope + tau + applied - damping * qd for slope, tau, applied, damping, qd in parts]
+        missing = [wanted - here for wanted, here in zip(p, momenta, strict=True)]
+    (before,) = new_variables("singular", 1, system.parameters)
+    try:
+        *steps, info = _solved(system, missing, build)
+    except SingularError as error:
+        raise SingularMassMatrixError(
+            f"the mass matrix is singular: coordinate {system.coordinates[error.index]!r} has no inertia, or none that "
+            "others do not share, and a method that steps momenta needs it"
+        ) from None
+    with building(build):
+        velocity = [qd + step for qd, step in zip(system.qd, steps, strict=True)]
+        singular = cg.where(before, before, info)
+
+    def graph(inputs: list[Node], outputs: list[Node], *last: Node) -> Graph:
+        numbered = {f"{k}": node for k, node in enumerate(outputs)}
+        whole = Graph([*inputs, *last, *system.tau, *system.extra_inputs], numbered)
+        bound = problem.bind([str(node.name) for node in (*inputs, *last)], whole)
+        return Graph([node for node in bound.inputs if node not in last] + list(last), bound.outputs)
+
+    state = [*system.q, *system.qd]
+    momentum, rate = graph(state, momenta), graph(state, force)
+    mass_matrix = [node for row in system.mass_matrix(system.lagrangian) for node in row]
+    quadratic = not reaches(mass_matrix, system.qd)
+    free = not reaches(rate.outputs.values(), system.qd)
+    constant = not reaches([*mass_matrix, *momentum.outputs.values()], [*system.q, system.t])
+    solved = graph([*state, *p], [*velocity, singular], before)
+    return Mechanics(momentum, rate, solved, quadratic, free and constant and quadratic)
+
+
+def _solved(system: System, rhs: list[Node], build: Builder) -> list[Node]:
+    """M^-1 rhs, and the info of `solve_nodes`: always 0 where a constant of M is negative, which divides as well."""
+    try:
+        return solve_nodes(system.lagrangian, system.qd, rhs, build, check=True)
+    except SingularError as error:
+        if not error.pivot:
+            raise
+    return [*solve_nodes(system.lagrangian, system.qd, rhs, build), cg.constant(0.0)]
 
 
 def composed_step(composition: Composition, problem: Problem) -> Step:
@@ -147,7 +229,7 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
 
 def _fixed(method: Partitioned) -> tuple[str, ...]:
     """Registers that the derivative of a step leaves out."""
-    sums = [f"{name}{i}" for name in ("change", "speed") for i in range(len(method.w))]
+    sums = [*numbered("change", len(method.w)), *numbered("speed", len(method.w))]
     return (*sums, *"q_rounding momentum_rounding singular failed failures going turns change_old".split())
 
 
@@ -183,12 +265,11 @@ def _part(step: float, done: float) -> Call:
 
 def _stage(weights: Fractions, base: str, slope: str, target: str) -> Map:
     """target = base + h * (sum of weight * slope)."""
-    slopes, parts = used(weights, slope)
 
     def stage(x: Node, h: Node, *slopes: Node) -> Values:
-        return {target: x + reduce(operator.add, _changes(h, slopes, parts))}
+        return {target: x + reduce(operator.add, _changes(h, slopes, weights))}
 
-    return each(stage, base, "h", *slopes)
+    return each(stage, base, "h", *numbered(slope, len(weights)))
 
 
 def _changes(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> list[Node]:
@@ -201,7 +282,7 @@ def _changes(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> li
 def _iterated(method: Partitioned, turn: Sequence[Statement]) -> list[Statement]:
     """Times and a first guess of the stages, and turns from V to W until W = V to rounding."""
     stages = range(len(method.w))
-    changes, speeds = ([f"{name}{i}" for i in stages] for name in ("change", "speed"))
+    changes, speeds = (numbered(name, len(stages)) for name in ("change", "speed"))
 
     def judged(turns: Node, change_old: Node, evaluations: Node, *sums: Node) -> Values:
         """Whether to go on: not when V has settled, no longer comes nearer, or is no number."""
@@ -238,7 +319,7 @@ def _added(base: str, slope: str, weights: Fractions) -> Map:
         x, after = compensated(x, change + reduce(operator.add, rest, before))
         return {base: x, rounding: after}
 
-    return each(end, base, rounding, "h", *[f"{slope}{k}" for k in range(len(weights))])
+    return each(end, base, rounding, "h", *numbered(slope, len(weights)))
 
 
 def _explicit(method: Partitioned, force: Call, velocity: Sequence[Statement], later: Call) -> list[Statement]:

@@ -24,8 +24,7 @@ from cgraph.extend import Call, If, NoSeriesError, Statement, copied, jets, stra
 
 from ..systems.arguments import TIME
 from .problem import Problem
-from .statements import Values, call, compensated, count, each, stage_time, total
-from .step import Step
+from .step import Step, Values, call, compensated, count, each, numbered, stage_time, total
 
 # Operations of all coefficients, before folding, that are one straight graph: more take a second to compile, and would
 # run a third faster.
@@ -39,16 +38,14 @@ SHORTEST = 2.0**-10  # units: the first try where terms say nothing, as of what 
 
 def taylor_step(problem: Problem, order: int) -> Step:
     """The step of an order."""
-    m, graphs, c = problem.size, _jets(problem), _names("c", order)
+    m, graphs, c = problem.size, _jets(problem), numbered("c", order, 1)
     if order * (len(graphs.order.nodes) + graphs.sums * order) <= SHORT_CODE:
         series: list[Statement] = [Call(straight(graphs, order), ("rate", "unit", "zeros"), tuple(c))]
         lengths: dict[str, int] = {}
     else:
         series, lengths = _by_orders(m, graphs, order)
 
-    def begin(next_: Node, end: Node, t: Node) -> Values:
-        return {"unit": cg.minimum(next_, abs(end - t)), "starting": 1.0}
-
+    begin = call(lambda next_, end, t: {"unit": cg.minimum(next_, abs(end - t)), "starting": 1.0})
     # By itself, so that the arrival follows no call that writes coefficients: it would gather them one by one.
     share = replace(call(lambda h, unit: {"s": h / unit}), exact=True)
     at_all = call(lambda unit, h: {"unit": cg.where(unit, unit, h)})  # where nothing is wished
@@ -58,7 +55,7 @@ def taylor_step(problem: Problem, order: int) -> Step:
         [share, _arrival(order)],
         [_rates(graphs, "x", "t"), count(1)],
         [at_all, *series, *_wish(order)],
-        [call(begin)],
+        [begin],
         kept=[copied("rounding_new", "rounding"), call(lambda h: {"unit": h, "starting": 0.0})],
         fixed=("rounding", "rounding_new", "atol", "weight", *controls),
         error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t"), count(1), *_checked(m, order)],
@@ -66,10 +63,6 @@ def taylor_step(problem: Problem, order: int) -> Step:
         handed=(),
         dense=[_dense(order)],
     )
-
-
-def _names(name: str, order: int) -> list[str]:
-    return [f"{name}{k}" for k in range(1, order + 1)]
 
 
 def _rates(graphs: Jets, x: str, t: str) -> Call:
@@ -89,9 +82,9 @@ def _jets(problem: Problem) -> Jets:
 
 def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[str, int]]:
     """Coefficients of one order after another, and the lengths of registers that it takes; `none` stays 0."""
-    orders = {name: float(k) for k, name in enumerate(_names("order", order), 1)}
+    orders = {name: float(k) for k, name in enumerate(numbered("order", order, 1), 1)}
     body: list[Statement] = [copied("rate", "rates0"), call(lambda: orders)]
-    lengths = dict.fromkeys([*_names("left", order), *_names("right", order), "sums", "none"], graphs.sums)
+    lengths = dict.fromkeys([*numbered("left", order, 1), *numbered("right", order, 1), "sums", "none"], graphs.sums)
     for k in range(1, order + 1):
         if k > 1 and graphs.sums:
             body.append(_products(k - 1))
@@ -102,7 +95,7 @@ def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[
 
 def _products(k: int) -> Statement:
     """The sums over products of both sides up to an order."""
-    sides = [*_names("left", k), *_names("right", k)]
+    sides = [*numbered("left", k, 1), *numbered("right", k, 1)]
     return each(lambda *factors: {"sums": convolution(factors[:k], factors[k:])}, *sides)
 
 
@@ -128,7 +121,7 @@ def _wish(order: int) -> list[Statement]:
         h = abs(unit) * cg.where(share > SHORTEST, share, SHORTEST)
         return {"next": cg.where(h < next_, h, next_)}
 
-    c, tolerance = _names("c", order), ("x", "rtol", "atol")
+    c, tolerance = numbered("c", order, 1), ("x", "rtol", "atol")
     last = total(lambda c, weight: {"last": (c * weight) * (c * weight)}, f"c{order}", "weight")
     return [
         If("starting", (each(at_start, *tolerance, *c),), (each(later, *tolerance, "c1"),)),
@@ -155,7 +148,7 @@ def _arrival(order: int) -> Statement:
         slope = s * _polynomial([k * each_one for k, each_one in enumerate(c, 1)], s)
         return {"x_new": x_new, "rounding_new": rounding_new, "slope": slope}
 
-    return each(arrival, "x", "rounding", "s", *_names("c", order))
+    return each(arrival, "x", "rounding", "s", *numbered("c", order, 1))
 
 
 def _polynomial(c: Sequence[Node], s: Node) -> Node:
@@ -194,4 +187,4 @@ def _dense(order: int) -> Statement:
         powers = itertools.accumulate([s] * order, operator.mul)
         return {f"dense{k}": term * power for k, (term, power) in enumerate(zip(c, powers, strict=True), 1)}
 
-    return each(terms, "s", *_names("c", order))
+    return each(terms, "s", *numbered("c", order, 1))

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from cgraph._shared import Array, counted, real_number
 
-from .estimates.run_estimate import RunEstimate
+from .estimates.error_estimate import RunEstimate
 from .run_options import SMALL_MEMORY, TABLES, RunOptions, room
 from .stepper import Stepper
 from .steps.dense_output import StepBlock

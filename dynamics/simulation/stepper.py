@@ -143,7 +143,7 @@ class Stepper(ABC):
                 return
             if not (self.status or log.ended or log.restart):
                 log.finish()
-            self.warnings += [each for each in log.warnings if each not in self.warnings]
+            self.warnings += [each for each in log.said.values() if each not in self.warnings]
             self.status, self.event = log.status or self.status, log.ended
             if self.status or log.restart is None:
                 return

@@ -3,7 +3,7 @@
 from typing import Any
 
 from dynamics import METHODS
-from dynamics.integrators.symplectic_tableaus import COMPOSITIONS
+from dynamics.integrators.tableau import COMPOSITIONS
 from tests.slow import slow
 
 # Compositions differ in their coefficients alone: of those a short and a long one, for what holds of every method.

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -39,14 +39,6 @@ LARGE_GRAPH = 1_000_000  # nodes; beyond, making machine code takes longer than 
 Inputs = str | Node | Sequence[str | Node] | None
 
 
-class Options(TypedDict):
-    """The choices of `compile`, besides the backend."""
-
-    fast: bool
-    fma: bool
-    cache: bool | str
-
-
 class Compiled(BoundFunction):
     """A graph compiled by `cg.compile`. Inputs and outputs are in the order of the graph's.
 
@@ -74,7 +66,7 @@ class Compiled(BoundFunction):
     ([[1.0]], [[5.0], [7.0]])
     """
 
-    def __init__(self, graph: Graph, backend: str, options: Options, ready: Ready, own: Ready) -> None:
+    def __init__(self, graph: Graph, backend: str, options: dict[str, Any], ready: Ready, own: Ready) -> None:
         self.graph, self.backend, self.options = graph, backend, options
         self.n_in, self.n_out = len(graph.inputs), len(graph.outputs)
         self._runner = own(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))
@@ -245,7 +237,8 @@ class Compiled(BoundFunction):
         >>> cg.compile(cg.Graph([x], {"y": x * x})).jacobian([[1.0], [2.0], [3.0]]).ravel().tolist()
         [2.0, 4.0, 6.0]
         """
-        return self._matrix(self._derivatives.jacobian(self._chosen(wrt)), self._points(x), sparse, threads)
+        chosen = None if wrt is None else self._chosen(wrt)
+        return self._matrix(self._derivatives.jacobian(chosen), self._points(x), sparse, threads)
 
     def hessian(
         self,
@@ -376,7 +369,7 @@ class Compiled(BoundFunction):
         return result
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
-        count = thread_count(threads)
+        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
         if not require_flag("sparse", sparse):
             return matrix.at(points, True, count)
         module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
@@ -464,7 +457,11 @@ def compile(
     """
     require_choice("backend", backend, BACKENDS)
     require_graph("compile", graph)
-    options: Options = {"fast": require_flag("fast", fast), "fma": require_flag("fma", fma), "cache": _place(cache)}
+    options: dict[str, Any] = {
+        "fast": require_flag("fast", fast),
+        "fma": require_flag("fma", fma),
+        "cache": _place(cache),
+    }
     large = backend == "auto" and len(graph.nodes) > LARGE_GRAPH
     if large:
         warnings.warn(
@@ -508,5 +505,5 @@ def require_version(version: str) -> None:
         raise ValueError(f"a compiled graph {problem}: pickle the graph alone, or compile it again")
 
 
-def _remade(_: object, graph: Graph, backend: str, options: Options) -> Compiled:
+def _remade(_: object, graph: Graph, backend: str, options: dict[str, Any]) -> Compiled:
     return compile(graph, backend, **options)

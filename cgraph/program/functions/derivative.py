@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from ...autodiff.sparsity import Indices, Indices32, Pattern, full, pattern, sym
 from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...core.node import Node, as_node, variable
+from ...util.caches import made_once
 from ...util.memory import aligned
 from ...util.threads import write_batch
 from ..fuse import applied
@@ -28,14 +28,12 @@ from ..statements.call import Call, Map
 from ..statements.memory import Scatter
 from .bound_function import BoundFunction
 
-Made = TypeVar("Made")
 Ready = Callable[[Program], Runner]  # makes a program ready to run
 Chosen = tuple[int, ...] | None  # the numbers of inputs; None for all
 CHECK = 256  # operations that take as long as to look whether slopes are infinite
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 LEAST_BLOCK = 64  # points in a block, a multiple of every processor's vectors
 LARGE_MATRIX = 2**16  # numbers in a matrix, of which no copy is kept for another call
-PANEL_NUMBERS = 2**22  # numbers in the rows of points and directions that are written at a time
 
 
 class Derivative(NamedTuple):
@@ -112,14 +110,11 @@ class DirectionProducts:
 
     def many(self, points: Array, directions: Array, results: Array, threads: int) -> None:
         """The results, (N, k, results), of N points, each along k directions of its own, (N, k, entries)."""
-        count, n, width = directions.shape[1], points.shape[1], self._beside.program.registers["x"]
-        size = max(1, PANEL_NUMBERS // (count * width))
-        for start in range(0, len(points), size):
-            here = slice(start, start + size)
-            rows = np.empty((len(points[here]), count, width))
-            rows[:, :, :n], rows[:, :, n:] = points[here, None], directions[here]
-            found = results[here].reshape(-1, results.shape[2])
-            write_batch(*self._beside.columns("x"), rows.reshape(-1, width).T, found.T, threads)
+        count, n = directions.shape[1], points.shape[1]
+        rows = np.empty((len(points), count, n + directions.shape[2]))
+        rows[:, :, :n], rows[:, :, n:] = points[:, None], directions
+        found = results.reshape(-1, results.shape[2])
+        write_batch(*self._beside.columns("x"), rows.reshape(-1, rows.shape[2]).T, found.T, threads)
         if self._derivative.guarded is not None:
             _mend(results, lambda at, found: self._careful.many(points[at], directions[at], found, threads))
 
@@ -184,10 +179,8 @@ class MatrixPart(NamedTuple):
 
     def seeds(self, lanes: int) -> Array:
         """Sum of the unit vectors of each color, a column each."""
-        seeds = np.zeros((len(self.colors), self.directions(lanes)))
-        for k, color in enumerate(self.colors):
-            if color != NONE:
-                seeds[k, color] = 1.0
+        colors = np.array(self.colors)
+        seeds: Array = (colors[:, None] == np.arange(self.directions(lanes))) * 1.0  # none of NONE
         return seeds.ravel()
 
 
@@ -196,7 +189,7 @@ class ColoredMatrix:
 
     entries: those that can be other than zero, in the order in which `at` gives them.
     source: the graph that gives them all, or the parts that do.  size: the numbers in a point.
-    lanes: the directions in a vector.
+    lanes: the directions in a vector.  Where no entry is left out, the whole matrix is the entries.
     """
 
     def __init__(
@@ -205,10 +198,9 @@ class ColoredMatrix:
         self.entries, self._source, self._size = entries, source, size
         self._parts = () if isinstance(source, Graph) else source
         self._lanes, self._ready = lanes, ready
+        self._directions = sum([part.directions(1) for part in self._parts])
         self._guarded = any([part.derivative.guarded is not None for part in self._parts])
-        self._made: dict[tuple[bool, int], Runner] = {}
-        self._making = threading.Lock()
-        self._small = math.prod(entries.shape) <= LARGE_MATRIX
+        self._full, self._small = full(entries), math.prod(entries.shape) <= LARGE_MATRIX
         self._functions = [BoundFunction(self.bind, size, shape) for shape in (entries.rows.shape, entries.shape)]
 
     @cached_property
@@ -232,7 +224,9 @@ class ColoredMatrix:
 
     def bind(self, x: Array, values: Array) -> Callable[[], None]:
         """A function of nothing that reads x and writes the values: entries, (count,), or into a matrix of zeros."""
-        run, registers = self._runner(values.ndim == 2, self._lanes).bind_pass(("x", x), ("y", values))
+        run, registers = self._runner(values.ndim == 2 and not self._full, self._lanes).bind_pass(
+            ("x", x), ("y", values)
+        )
         for name, seeds in self._seeds(self._lanes).items():
             registers[name][:] = seeds
         if "nonfinite" not in registers:
@@ -252,9 +246,9 @@ class ColoredMatrix:
             values[...] = 0.0
             return
         rows = values.reshape(len(points), -1)
-        seeds, directions = self._beside
-        width, columns = self._runner(values.ndim == 3, 1).columns("x", seeds)
-        write_batch(max(width // (1 + directions) // LEAST_BLOCK, 1) * LEAST_BLOCK, columns, points.T, rows.T, threads)
+        width, columns = self._runner(values.ndim == 3 and not self._full, 1).columns("x", self._seeds)
+        width //= 1 + self._directions
+        write_batch(max(width // LEAST_BLOCK, 1) * LEAST_BLOCK, columns, points.T, rows.T, threads)
         if self._guarded:
             _mend(values, lambda at, found: self._careful.write(points[at], found, threads))
 
@@ -264,22 +258,14 @@ class ColoredMatrix:
         parts = [part._replace(derivative=part.derivative.careful) for part in self._parts]
         return ColoredMatrix(self.entries, parts, self._size, self._lanes, self._ready)
 
-    @cached_property
-    def _beside(self) -> tuple[dict[str, Array], int]:
-        """Of points side by side: seeds, and the number of directions."""
-        return self._seeds(1), sum([part.directions(1) for part in self._parts])
-
-    def _seeds(self, lanes: int) -> dict[str, Array]:
+    def _seeds(self, lanes: int = 1) -> dict[str, Array]:
         """Numbers in the registers of directions."""
         return {f"s{k}": part.seeds(lanes) for k, part in enumerate(self._parts)}
 
+    @made_once
     def _runner(self, dense: bool, lanes: int) -> Runner:
-        """Runner of the program, made at the first use; the whole matrix is the entries, where none is left out."""
-        key = dense and not full(self.entries), lanes
-        with self._making:
-            if key not in self._made:
-                self._made[key] = self._ready(self._program(*key))
-            return self._made[key]
+        """Runner of the program."""
+        return self._ready(self._program(dense, lanes))
 
     def _program(self, dense: bool, lanes: int) -> Program:
         """x -> y, the entries, or with `dense` the whole matrix; the directions in vectors of so many lanes."""
@@ -308,39 +294,22 @@ class ColoredMatrix:
         return Program(registers, statements, ["y"])
 
 
-def _once(make: Callable[..., Made]) -> Callable[..., Made]:
-    """Method whose result for its arguments is made once, by whichever thread asks first."""
-
-    def made(self: Derivatives, *arguments: Hashable) -> Made:
-        found: Made | None = self.made.get((make, arguments))
-        if found is None:
-            with self.making:
-                if (make, arguments) not in self.made:
-                    self.made[make, arguments] = make(self, *arguments)
-                found = self.made[make, arguments]
-        return found
-
-    return made
-
-
 class Derivatives:
     """The derivatives of a graph by chosen inputs.
 
-    runner: what runs the graph itself.  ready: makes a program ready to run in the same way.  made: what there is.
+    runner: what runs the graph itself.  ready: makes a program ready to run in the same way.
     """
 
     def __init__(self, graph: Graph, ready: Ready, runner: Runner) -> None:
         self._given, self._ready, self._size = graph, ready, len(graph.inputs)
         self._lanes, self._block, self.vector_cost = runner.lanes, runner.lanes * runner.vectors, runner.vector_cost
-        self.made: dict[Hashable, Any] = {}
-        self.making = threading.RLock()
 
-    @_once
+    @made_once
     def products(self, chosen: Chosen, reverse: bool) -> DirectionProducts:
         """J x_dot, or with `reverse` J^T y_bar."""
         return DirectionProducts(self._derivative(chosen, reverse), self._ready, self._block)
 
-    @_once
+    @made_once
     def jacobian(self, chosen: Chosen) -> ColoredMatrix:
         """The Jacobian, from whichever sweeps cost less."""
         wrt = self._wrt(chosen)
@@ -361,7 +330,7 @@ class Derivatives:
                 parts.append(MatrixPart(self._derivative(chosen, reverse), colors, color, result, which))
         return self._colored(entries, parts, self._size)
 
-    @_once
+    @made_once
     def hessian(self, chosen: Chosen) -> ColoredMatrix:
         """The Hessian of y_bar . y, of points (x, y_bar)."""
         wrt, size = self._wrt(chosen), self._size + len(self._graph.outputs)
@@ -385,7 +354,7 @@ class Derivatives:
     def _colored(self, entries: Pattern, source: Graph | Sequence[MatrixPart], size: int) -> ColoredMatrix:
         return ColoredMatrix(entries, source, size, self._lanes, self._ready)
 
-    @_once
+    @made_once
     def _derivative(self, chosen: Chosen, reverse: bool) -> Derivative:
         wrt = self._wrt(chosen)
         if reverse:

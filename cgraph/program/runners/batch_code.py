@@ -119,16 +119,6 @@ class LaneCode:
 
     numbers: {register: place in the row of a memory}, of those registers that outlive a pass.  size: of such a row.
     Any number of threads may call it at once, on rows of their own.
-
-    Of x = x / 2, while x > 1:
-
-    >>> import cgraph as cg
-    >>> from cgraph.extend import Call, Program, runner
-    >>> x = cg.variable("x")
-    >>> halve = Call(cg.Graph([x], {"x": 0.5 * x, "done": 0.5 * x <= 1.0}), ("x",), ("x", "done"))
-    >>> code = runner(Program({"x": 1, "done": 1}, [halve], ["x"], stop="done")).lane_code("x")
-    >>> sorted(code.numbers)
-    ['x']
     """
 
     def __init__(self, code: Code, program: Program, kept: Sequence[str], lanes: int, size: int) -> None:

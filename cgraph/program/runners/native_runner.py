@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import threading
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from types import ModuleType
@@ -18,17 +17,18 @@ from ...codegen.bound_call import LONG, SHORT, bound_call
 from ...codegen.llvm_ir import point_arithmetic
 from ...core.evaluation import Array
 from ...core.scope import without_collection
+from ...util.caches import made_once
 from ...util.memory import aligned
 from ..fuse import fused
 from ..program import Program, outliving, whole_graph
 from ..statement import row_of
 from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts
-from .runner import NONE, Record, Runner
+from .runner import Record, Runner, Start
 
 if TYPE_CHECKING:
     from ...codegen.batch_ir import Batch
     from ...codegen.disk_cache import Cache
-    from .batch_code import BatchCode, LaneCode
+    from .batch_code import LaneCode
 
 _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
@@ -64,15 +64,6 @@ class NativeRunner(Runner):
         self._nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
         self._functions = program_functions(self._fused)
         host.require(self._functions)
-        self._lock = threading.RLock()
-        self._made: dict[Hashable, Any] = {}  # code, made at its first use
-
-    def _once(self, key: Hashable, make: Callable[[], Any]) -> Any:
-        if key not in self._made:
-            with self._lock:
-                if key not in self._made:
-                    self._made[key] = make()
-        return self._made[key]
 
     def _compiled(self, text: str, lanes: int = 1, *, looped: bool = False) -> llvm.Code:
         return self._host.compile(text, self._functions, self._nodes, self._cache, lanes=lanes, looped=looped)
@@ -95,16 +86,13 @@ class NativeRunner(Runner):
         """The program of a vector of memories."""
         return self._fused if self.masked is self.program else fused(self.masked)
 
+    @made_once
     def _entry(self, lanes: int) -> Any:
         """Machine code that runs so many memories."""
-
-        def made() -> Any:
-            how = self._flags, self._host.registers
-            arithmetic = point_arithmetic(*how) if lanes == 1 else Arithmetic(self._flags, lanes, self._host.registers)
-            program = self._fused if lanes == 1 else self._fused_many
-            return self._compiled(program_ir(program, arithmetic, self.width), lanes).function("run", _RUN)
-
-        return self._once(lanes, made)
+        registers = self._host.registers
+        one, vectors = point_arithmetic(self._flags, registers), Arithmetic(self._flags, lanes, registers)
+        program, arithmetic = (self._fused, one) if lanes == 1 else (self._fused_many, vectors)
+        return self._compiled(program_ir(program, arithmetic, self.width), lanes).function("run", _RUN)
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         rows = np.empty((passes // every, self.program.width))
@@ -156,31 +144,23 @@ class NativeRunner(Runner):
         registers = {name: memory[at : at + lengths[name]] for name, at in code.places.items() if name}
         return bound_call(code.entry, x[1], y[1], memory), registers
 
+    @made_once
     def point(self, x: str, y: str) -> PointCode:
         """Machine code of one pass of which two registers lie apart."""
+        with without_collection():
+            text, places = point_ir(self._fused, x, y, self._flags, self.width, self._host.registers)
+        entry = self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG)
+        return PointCode(text, entry, places)
 
-        def made() -> PointCode:
-            with without_collection():
-                text, places = point_ir(self._fused, x, y, self._flags, self.width, self._host.registers)
-            entry = self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG)
-            return PointCode(text, entry, places)
-
-        code: PointCode = self._once((x, y), made)
-        return code
-
-    def columns(self, name: str, start: Mapping[str, Array] = NONE) -> tuple[int, Callable[[Array, Array], None]]:
+    @made_once
+    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
         """The points in a block, and the machine code."""
-
-        def made() -> tuple[int, BatchCode]:
-            lanes, text, alone = self._host.lanes, self._pass(name), whole_graph(self._fused, name) is not None
-            code = self._compiled(text.source, lanes, looped=not alone)
-            places = offsets(self._fused_many.registers, 1) if start else {}
-            begin = {places[other]: numbers for other, numbers in start.items()}
-            width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
-            return width, self._side.BatchCode(code, lanes, text.size, begin, columns=alone)
-
-        code: tuple[int, BatchCode] = self._once(("columns", name), made)
-        return code
+        lanes, text, alone = self._host.lanes, self._pass(name), whole_graph(self._fused, name) is not None
+        code, values = self._compiled(text.source, lanes, looped=not alone), start()
+        places = offsets(self._fused_many.registers, 1) if values else {}
+        begin = {places[other]: numbers for other, numbers in values.items()}
+        width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
+        return width, self._side.BatchCode(code, lanes, text.size, begin, columns=alone)
 
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Registers that outlive a pass, or are results, are in a memory; the others in the code's own."""

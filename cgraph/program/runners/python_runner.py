@@ -16,7 +16,7 @@ from ..many import many
 from ..program import Program, whole_graph
 from ..statement import Execution
 from ..statements.call import spread
-from .runner import NONE, Record, Runner
+from .runner import Record, Runner, Start
 
 if TYPE_CHECKING:
     from .batch_code import LaneCode
@@ -112,13 +112,14 @@ class PythonRunner(Runner):
 
         return run, arrays
 
-    def columns(self, name: str, start: Mapping[str, Array] = NONE) -> tuple[int, Callable[[Array, Array], None]]:
+    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
         """Of one graph its function of arrays; "python" alone goes point by point."""
         if (graph := whole_graph(self.program, name)) is None:
+            begin = start()
 
             def write(values: Array, records: Array) -> None:
                 count = values.shape[1]
-                others = {each: np.repeat(numbers[:, None], count, axis=1) for each, numbers in start.items()}
+                others = {each: np.repeat(numbers[:, None], count, axis=1) for each, numbers in begin.items()}
                 memories = self.memory({name: values, **others}, count)
                 records[...] = self._run_many(memories, 1, 1, np.empty((1, 0, count))).rows[0]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -22,7 +21,7 @@ from .llvm_ir import offsets
 if TYPE_CHECKING:
     from .batch_code import LaneCode
 
-NONE: Mapping[str, Array] = MappingProxyType({})
+Start = Callable[[], Mapping[str, Array]]  # gives initial values of registers
 
 
 class Record(NamedTuple):
@@ -186,10 +185,10 @@ class Runner(ABC):
         """
 
     @abstractmethod
-    def columns(self, name: str, start: Mapping[str, Array] = NONE) -> tuple[int, Callable[[Array, Array], None]]:
+    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
         """The k worth a thread's start, and a writer of records, (width, k), of values of a register, (length, k).
 
-        start: initial values of other registers (default 0).
+        start: gives initial values of other registers (default 0).
         """
 
     def _require_beside(self) -> None:

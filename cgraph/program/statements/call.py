@@ -7,7 +7,7 @@ import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,15 +17,7 @@ from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...core.node import Node
 from ...writing.naming import variables
-from ..statement import (
-    Execution,
-    Lengths,
-    Names,
-    Statement,
-    length_of,
-    require_length,
-    require_once,
-)
+from ..statement import Execution, Lengths, Names, Statement, length_of, require_length, require_once
 
 if TYPE_CHECKING:
     from ..writer import Writer
@@ -109,11 +101,10 @@ def elements(statement: Map | Sum, lengths: Lengths) -> int:
     """The number of elements that a statement runs over."""
     if isinstance(statement, Map):
         results = len(statement.graph.outputs)
-        return sum([lengths[name] for name in statement.outputs]) // results if results else 1
+        return _total(lengths, statement.outputs) // results if results else 1
     wide = [lengths[name] for name in statement.inputs if lengths[name] != 1]
-    numbers = len(statement.graph.inputs) - sum([lengths[name] for name in statement.shared])
-    of_each = numbers - len(statement.inputs) + len(wide)
-    return sum(wide) // max(1, of_each) if wide else 1
+    single = len(statement.inputs) - len(wide) + _total(lengths, statement.shared)
+    return sum(wide) // max(1, len(statement.graph.inputs) - single) if wide else 1
 
 
 def sizes(statement: Map | Sum, lengths: Lengths, names: Names) -> tuple[int, ...]:
@@ -124,9 +115,12 @@ def sizes(statement: Map | Sum, lengths: Lengths, names: Names) -> tuple[int, ..
 
 def several(statement: Map | Sum, lengths: Lengths) -> bool:
     """Whether an element has several numbers in a register."""
-    shared = sum([lengths[name] for name in statement.shared])
-    fewer = len(statement.inputs) + shared < len(statement.graph.inputs)
+    fewer = len(statement.inputs) + _total(lengths, statement.shared) < len(statement.graph.inputs)
     return fewer or (isinstance(statement, Map) and len(statement.outputs) < len(statement.graph.outputs))
+
+
+def _total(lengths: Lengths, names: Names) -> int:
+    return sum([lengths[name] for name in names])
 
 
 def copied(source: str, target: str) -> Map:
@@ -168,39 +162,40 @@ _ADDED = Graph([_A, _B], {"sum": _A + _B})
 # what registers must fit
 
 
-class _Named(NamedTuple):
-    """How an error calls a statement; text only where there is one, since edges of a large graph take long to count."""
-
-    statement: Call | Map | Sum
-
-    def __str__(self) -> str:
-        return f"{type(self.statement).__name__} of {self.statement.graph!r}"
+def _where(statement: Call | Map | Sum) -> str:
+    """How an error calls a statement."""
+    graph = statement.graph
+    return (
+        f"{type(statement).__name__} of a graph {', '.join(graph.input_names[:4])} -> {', '.join([*graph.outputs][:4])}"
+    )
 
 
 def check_call(call: Call, lengths: Lengths) -> None:
     """Raises GraphError if the registers do not hold as many numbers as the graph has inputs and outputs."""
-    where = _Named(call)
-    sides = (("inputs", call.inputs, len(call.graph.inputs)), ("outputs", call.outputs, len(call.graph.outputs)))
-    for what, names, wanted in sides:
-        if (total := sum([length_of(lengths, where, name) for name in names])) != wanted:
-            raise GraphError(f"{where} needs {wanted} {what}, the registers {', '.join(names)} hold {total}")
+    where = _where(call)
+    _require_total(where, lengths, "inputs", call.inputs, len(call.graph.inputs))
+    _require_total(where, lengths, "outputs", call.outputs, len(call.graph.outputs))
     require_once(where, call.outputs)
 
 
 def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
-    where, graph, outputs = _Named(statement), statement.graph, statement.outputs
+    where, graph, outputs = _where(statement), statement.graph, statement.outputs
     known = sum([length_of(lengths, where, name) for name in statement.shared])
     if known > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
     for name in (*statement.inputs, *outputs):
         length_of(lengths, where, name)
-    count = elements(statement, lengths)
     registers = [(statement.inputs, len(graph.inputs) - known)]
     if isinstance(statement, Map):
         registers.append((outputs, len(graph.outputs)))
         for name in statement.asked:
             require_length(lengths, where, name, 1)
+    elif len(outputs) == len(graph.outputs) == 1:
+        require_length(lengths, where, outputs[0], 1)
+    else:
+        _require_total(where, lengths, "outputs", outputs, len(graph.outputs))
+    count = elements(statement, lengths)
     for names, wanted in registers:
         of_each = sizes(statement, lengths, names)
         if sum(of_each) != wanted:
@@ -208,14 +203,12 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
         for name, size in zip(names, of_each, strict=True):
             if lengths[name] != count * size and (lengths[name] != 1 or names is outputs):
                 raise GraphError(f"{where}: register {name!r} needs length {count} or 1, got {lengths[name]}")
-    if isinstance(statement, Map):
-        require_once(where, outputs)
-        return
-    if len(outputs) == len(graph.outputs) == 1:
-        require_length(lengths, where, outputs[0], 1)
-    elif (total := sum([lengths[name] for name in outputs])) != len(graph.outputs):
-        raise GraphError(f"{where} needs {len(graph.outputs)} outputs, the registers {', '.join(outputs)} hold {total}")
     require_once(where, outputs)
+
+
+def _require_total(where: str, lengths: Lengths, what: str, names: Names, wanted: int) -> None:
+    if (total := sum([length_of(lengths, where, name) for name in names])) != wanted:
+        raise GraphError(f"{where} needs {wanted} {what}, the registers {', '.join(names)} hold {total}")
 
 
 # in Python: of one memory, and of many
@@ -228,21 +221,21 @@ def run_call(call: Call, state: State, execution: Execution) -> None:
 
 def run_map(statement: Map, state: State, execution: Execution) -> None:
     """Run in Python, element by element; as one batch where registers are arrays, or hold several numbers of each."""
-    count = elements(statement, execution.lengths)
-    if several(statement, execution.lengths) or isinstance(state[statement.outputs[0]], np.ndarray):
-        for name in statement.asked:
-            count = int(min(max(1.0, state[name][0]), count))
-        results, at = _at_once(statement, state, (count,), execution), 0
-        for name, size in zip(statement.outputs, sizes(statement, execution.lengths, statement.outputs), strict=True):
-            numbers = np.asarray(state[name], dtype=np.float64).reshape(size, -1)
-            numbers[:, :count] = results[at : at + size]
-            if not isinstance(state[name], np.ndarray):  # which has them already
-                state[name] = numbers.ravel().tolist()
-            at += size
+    lengths = execution.lengths
+    if not several(statement, lengths) and isinstance(state[statement.outputs[0]], list):
+        columns = zip(*_rows(statement, state, execution), strict=True)
+        state.update(zip(statement.outputs, map(list, columns), strict=False))
         return
-    columns = _rows(statement, state, execution)
-    for slot, name in enumerate(statement.outputs):
-        state[name] = [values[slot] for values in columns]
+    count, at = elements(statement, lengths), 0
+    for name in statement.asked:
+        count = int(min(max(1.0, state[name][0]), count))
+    results = _at_once(statement, state, (count,), execution)
+    for name, size in zip(statement.outputs, sizes(statement, lengths, statement.outputs), strict=True):
+        numbers = np.asarray(state[name], dtype=np.float64).reshape(size, -1)
+        numbers[:, :count] = results[at : at + size]
+        if isinstance(state[name], list):  # an array has them already
+            state[name] = numbers.ravel().tolist()
+        at += size
 
 
 def run_sum(statement: Sum, state: State, execution: Execution) -> None:
@@ -261,11 +254,8 @@ def _rows(statement: Map | Sum, state: State, execution: Execution) -> list[Sequ
         numbers = state[name]
         one_for_all = len(numbers) == 1
         inputs += [numbers * count] if one_for_all else [numbers[k : k + count] for k in range(0, len(numbers), count)]
-    return (
-        [execution.values(statement.graph, values) for values in zip(*inputs, strict=True)]
-        if inputs
-        else [execution.values(statement.graph, ()) for _ in range(count)]
-    )
+    points = zip(*inputs, strict=True) if inputs else [()] * count
+    return [execution.values(statement.graph, values) for values in points]
 
 
 def _joined(state: Mapping[str, list[float]], names: Sequence[str]) -> list[float]:
@@ -289,14 +279,12 @@ def call_beside(call: Call, state: dict[str, Array], execution: Execution) -> No
 
 def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Execution) -> None:
     """Run many memories: all elements as one batch."""
-    shape = (elements(statement, execution.lengths), execution.many)
-    results = _at_once(statement, state, shape, execution)
+    count, many = elements(statement, execution.lengths), execution.many
+    results = _at_once(statement, state, (count, many), execution)
     if isinstance(statement, Map):
-        results = results.reshape(len(results) * shape[0], shape[1])
-    elif shape[0]:
-        results = np.add.accumulate(results, axis=1)[:, -1]
+        results = results.reshape(len(results) * count, many)
     else:
-        results = np.zeros((len(results), shape[1]))
+        results = np.add.accumulate(results, axis=1)[:, -1] if count else np.zeros((len(results), many))
     spread(results, statement.outputs, state)
 
 

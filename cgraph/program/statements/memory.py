@@ -8,21 +8,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...codegen.arithmetic import Arithmetic
 from ...codegen.function_writer import FunctionWriter
 from ...core.checks import GraphError
-from ...core.evaluation import Array
-from ..statement import (
-    Execution,
-    Lengths,
-    Names,
-    Statement,
-    length_of,
-    require_length,
-    require_once,
-)
+from ..statement import Execution, Lengths, Names, Statement, length_of, require_length, require_once
 
 if TYPE_CHECKING:
     from ..writer import Writer
@@ -86,24 +76,19 @@ class Pop(Statement):
     rows: Names
 
 
-def check_take(take: Take, lengths: Lengths) -> None:
-    """Raises GraphError if a place is not in the source, or there are not as many as the target has numbers."""
-    size = length_of(lengths, "Take", take.source)
-    require_length(lengths, "Take", take.target, len(take.table))
-    if outside := [place for place in take.table if not (isinstance(place, int) and 0 <= place < size)]:
-        raise GraphError(f"Take needs places from 0 to {size - 1} of register {take.source!r}, got {outside[0]!r:.60}")
-
-
-def check_scatter(statement: Scatter, lengths: Lengths) -> None:
+def check_numbers(statement: Take | Scatter, lengths: Lengths) -> None:
     """Raises GraphError if a place is outside of its register, or there are not as many on either side."""
-    for name, places in ((statement.source, statement.table), (statement.target, statement.places)):
-        size = length_of(lengths, "Scatter", name)
-        if places and not 0 <= min(places) <= max(places) < size:
-            raise GraphError(f"Scatter needs places from 0 to {size - 1} of register {name!r}")
-    if len(statement.table) != len(statement.places):
-        raise GraphError(
-            f"Scatter needs a place for each of {len(statement.table)} numbers, got {len(statement.places)}"
-        )
+    kind, sides = type(statement).__name__, [(statement.source, statement.table)]
+    if isinstance(statement, Scatter):
+        sides.append((statement.target, statement.places))
+    else:
+        require_length(lengths, kind, statement.target, len(statement.table))
+    for name, places in sides:
+        size = length_of(lengths, kind, name)
+        if outside := [place for place in places if not (isinstance(place, int) and 0 <= place < size)]:
+            raise GraphError(f"{kind} needs places from 0 to {size - 1} of register {name!r}, got {outside[0]!r:.60}")
+    if len(sides[-1][1]) != len(statement.table):
+        raise GraphError(f"{kind} needs a place for each of {len(statement.table)} numbers, got {len(sides[-1][1])}")
 
 
 def check_stack(statement: Push | Pop, lengths: Lengths) -> None:
@@ -118,51 +103,35 @@ def check_stack(statement: Push | Pop, lengths: Lengths) -> None:
         require_once(where, statement.rows)
 
 
-def run_take(take: Take, state: dict[str, Any], execution: Execution) -> None:
+def run_numbers(statement: Take | Scatter, state: dict[str, Any], execution: Execution) -> None:
     """Run in Python, of one memory or of many."""
-    execution.write(state, take.target, np.asarray(state[take.source], dtype=np.float64)[list(take.table)])
+    numbers = np.asarray(state[statement.source], dtype=np.float64)[list(statement.table)]
+    if isinstance(statement, Scatter):
+        target = np.array(state[statement.target], dtype=np.float64)
+        target[list(statement.places)] = numbers
+        numbers = target
+    execution.write(state, statement.target, numbers)
 
 
-def run_scatter(statement: Scatter, state: dict[str, Any], execution: Execution) -> None:
-    """Run in Python."""
-    if execution.many >= 0:  # else in place
-        state[statement.target] = np.array(state[statement.target])
-    source, target = state[statement.source], state[statement.target]
-    for number, place in zip(statement.table, statement.places, strict=True):
-        target[place] = source[number] if execution.many >= 0 else float(source[number])
-
-
-def run_push(push: Push, state: dict[str, Any], execution: Execution) -> None:
+def run_stack(statement: Push | Pop, state: dict[str, Any], execution: Execution) -> None:
     """Run in Python, of one memory or of many, each with a count of its own."""
-    stack, row = np.array(state[push.stack]), _row(state, push)
-    count, number = np.asarray(state[push.count]), np.asarray(state[push.count]).ravel()
-    fits = (number >= 0.0) & (number < _most(push, execution.lengths))
-    lanes = np.flatnonzero(fits)
-    stack.reshape(len(stack), number.size)[_places(number[lanes], len(row)), lanes] = row[:, lanes]
-    execution.write(state, push.stack, stack)
-    execution.write(state, push.count, np.where(fits, number + 1.0, math.nan).reshape(count.shape))
-
-
-def run_pop(pop: Pop, state: dict[str, Any], execution: Execution) -> None:
-    """Run in Python, of one memory or of many."""
-    stack, row = np.asarray(state[pop.stack]), np.full_like(_row(state, pop), math.nan)
-    count, number = np.asarray(state[pop.count]), np.asarray(state[pop.count]).ravel()
-    some = (number > 0.0) & (number <= _most(pop, execution.lengths))
-    lanes = np.flatnonzero(some)
-    row[:, lanes] = stack.reshape(len(stack), number.size)[_places(number[lanes] - 1.0, len(row)), lanes]
-    execution.write(state, pop.count, np.where(some, number - 1.0, math.nan).reshape(count.shape))
-    at = 0
-    for name in pop.rows:
-        length = execution.lengths[name]
-        execution.write(state, name, row[at : at + length].reshape(length, *count.shape[1:]))
-        at += length
-
-
-def _row(state: dict[str, Any], statement: Push | Pop) -> Array:
-    """The numbers of the registers, end to end, (width, memories)."""
-    count = np.asarray(state[statement.count])
+    push, count = isinstance(statement, Push), np.asarray(state[statement.count])
+    number, most = count.ravel(), _most(statement, execution.lengths)
+    fits = (number >= 0.0) & (number < most) if push else (number > 0.0) & (number <= most)
+    lanes, after = np.flatnonzero(fits), number + (1.0 if push else -1.0)
     parts = [np.asarray(state[name], dtype=np.float64).reshape(-1, count.size) for name in statement.rows]
-    return np.concatenate([np.empty((0, count.size)), *parts])
+    row, stack = np.concatenate([np.empty((0, count.size)), *parts]), np.array(state[statement.stack])
+    first = np.minimum(number, after)[lanes].astype(int)
+    places = (first * len(row) + np.arange(len(row))[:, None], lanes)
+    if push:
+        stack.reshape(len(stack), number.size)[places] = row[:, lanes]
+        execution.write(state, statement.stack, stack)
+    else:
+        row[...] = math.nan
+        row[:, lanes] = stack.reshape(len(stack), number.size)[places]
+        for name, part in zip(statement.rows, np.split(row, np.cumsum([*map(len, parts)])[:-1]), strict=True):
+            execution.write(state, name, part.reshape(len(part), *count.shape[1:]))
+    execution.write(state, statement.count, np.where(fits, after, math.nan).reshape(count.shape))
 
 
 def _most(statement: Push | Pop, lengths: Lengths) -> float:
@@ -171,58 +140,36 @@ def _most(statement: Push | Pop, lengths: Lengths) -> float:
     return float(lengths[statement.stack] // width) if width else math.inf
 
 
-def _places(number: Array, width: int) -> NDArray[np.int_]:
-    """Places of the rows of these numbers in a stack, (width, N)."""
-    return number.astype(int) * width + np.arange(width)[:, None]
-
-
-def take_text(take: Take, writer: Writer) -> None:
+def numbers_text(statement: Take | Scatter, writer: Writer) -> None:
     """Write as machine code."""
-    name = writer.functions.take(take.table)
-    writer.calls(name, (take.source,), (take.target,))
+    if isinstance(statement, Take):
+        writer.calls(writer.functions.take(statement.table), (statement.source,), (statement.target,))
+    else:
+        name = writer.functions.take(statement.table, statement.places)
+        writer.call(name, [writer.pointer(statement.source), writer.pointer(statement.target)])
 
 
-def scatter_text(scatter: Scatter, writer: Writer) -> None:
-    """Write as machine code."""
-    name = writer.functions.take(scatter.table, scatter.places)
-    writer.call(name, [writer.pointer(scatter.source), writer.pointer(scatter.target)])
-
-
-def push_text(push: Push, writer: Writer) -> None:
-    """if (0 <= count < most) { stack[count] = row; count += 1 } else count = NaN, in every lane."""
-    count, one = writer.load(push.count), writer.number(1.0)
-    fits = _both(writer, writer.compare("oge", count, 0.0), writer.compare("olt", count, _most(push, writer.registers)))
-    _move(writer, "stack.put", push, fits, count)
-    after = writer.value(f"fadd {writer.type} {count}, {one}")
-    writer.store(writer.choose(fits, after, math.nan), push.count)
-
-
-def pop_text(pop: Pop, writer: Writer) -> None:
-    """if (0 < count <= most) { count -= 1; row = stack[count] } else row = count = NaN, in every lane."""
-    count, one = writer.load(pop.count), writer.number(1.0)
-    some = _both(writer, writer.compare("ogt", count, 0.0), writer.compare("ole", count, _most(pop, writer.registers)))
-    left = writer.value(f"fsub {writer.type} {count}, {one}")
-    for name in pop.rows:
+def stack_text(statement: Push | Pop, writer: Writer) -> None:
+    """if (0 <= count < most) { stack[count] = row; count += 1 } else count = NaN, in every lane; or back."""
+    push, most, count = isinstance(statement, Push), _most(statement, writer.registers), writer.load(statement.count)
+    low, high = (
+        writer.compare("oge" if push else "ogt", count, 0.0),
+        writer.compare("olt" if push else "ole", count, most),
+    )
+    fits = writer.value(f"and {writer.bits} {low}, {high}")
+    after = writer.value(f"{'fadd' if push else 'fsub'} {writer.type} {count}, {writer.number(1.0)}")
+    for name in () if push else statement.rows:
         writer.fill_with_nan(name)
-    _move(writer, "stack.get", pop, some, left)
-    writer.store(writer.choose(some, left, math.nan), pop.count)
-
-
-def _both(writer: Writer, a: str, b: str) -> str:
-    """The lanes in which two conditions hold."""
-    return writer.value(f"and {writer.bits} {a}, {b}")
-
-
-def _move(writer: Writer, name: str, statement: Push | Pop, condition: str, number: str) -> None:
-    """Row `number` of a stack to its registers, "stack.get", or back, "stack.put", in the lanes of a condition."""
-    begin, at = writer.room(), 0
-    first = writer.value(f"fmul {writer.type} {number}, {writer.number(float(sum(writer.lengths(statement.rows))))}")
-    writer.store_at(writer.choose(condition, first, -1.0), begin)
-    function = writer.functions.text(name, partial(_move_text, name=name))
-    for register in statement.rows:
+    width, begin, at = writer.number(float(sum(writer.lengths(statement.rows)))), writer.room(), 0
+    first = writer.value(f"fmul {writer.type} {count if push else after}, {width}")
+    writer.store_at(writer.choose(fits, first, -1.0), begin)
+    function = "stack.put" if push else "stack.get"
+    function = writer.functions.text(function, partial(_move_text, name=function))
+    for register in statement.rows:  # in the lanes where begin >= 0
         length = writer.registers[register]
         writer.call(function, [writer.pointer(statement.stack), begin, writer.pointer(register)], at, length)
         at += length
+    writer.store(writer.choose(fits, after, math.nan), statement.count)
 
 
 def _move_text(arithmetic: Arithmetic, name: str) -> list[str]:
@@ -233,10 +180,7 @@ def _move_text(arithmetic: Arithmetic, name: str) -> list[str]:
         with ir.when(ir.value(f"fcmp oge double {begin}, 0.0")):
             first = ir.integer("add", ir.value(f"fptosi double {begin} to i64"), "%at")
             with ir.loop(0, "%n") as j:
-                in_stack, in_row = (
-                    ir.double_at("%stack", ir.integer("add", first, j), lane),
-                    ir.double_at("%row", j, lane),
-                )
-                source, target = (in_row, in_stack) if name == "stack.put" else (in_stack, in_row)
+                ends = [ir.double_at("%stack", ir.integer("add", first, j), lane), ir.double_at("%row", j, lane)]
+                target, source = ends if name == "stack.put" else ends[::-1]
                 ir.store_at(ir.load_at(source, "double"), target, "double")
     return ir.function(f"internal void @{name}(ptr %stack, ptr %begin, ptr %row, i64 %at, i64 %n) nounwind")

@@ -25,8 +25,9 @@ from ..states.initial_value import normalized
 from .linearization_parts import by_upper, linearization_parts
 from .momentum_parts import momentum_parts, of_momenta
 
-# Nodes, about; beyond, slopes along directions are made in a fraction of the time, and soon are as fast.
+# Nodes; beyond, slopes along directions are made in a fraction of the time, and soon are as fast.
 WRITTEN_OUT = 20_000
+FORWARD_SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 
 
 @Equation("q qd tau", Output("A_{}_{}", ("2n", "2n")), Output("B_{}_{}", ("2n", "n"))).describes
@@ -108,11 +109,14 @@ def linear_rows(system: System, form: str) -> LinearRows:
 @kept_by_first
 def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows:
     """The last: forces and damping of the system, which may be given anew."""
-    n = system.n
-    if form == "velocity" and n * len(forward_dynamics(system).nodes) >= WRITTEN_OUT:
+    n, velocity = system.n, form == "velocity"
+    if velocity and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // FORWARD_SHARE:
         return _displaced(system)
-    graph = (linearization_parts(system) if form == "velocity" else momentum_parts(system)).written_out()
-    above = np.eye(n if form == "velocity" and system.kinematics.quasi is None else 0, 3 * n, n)
+    parts = linearization_parts(system) if velocity else momentum_parts(system)
+    if velocity and parts.size >= WRITTEN_OUT:
+        return _displaced(system)
+    graph = parts.written_out()
+    above = np.eye(n if velocity and system.kinematics.quasi is None else 0, 3 * n, n)
     below = range(len(above), 2 * n)
     names = [[*[f"A_{i}_{j}" for j in range(2 * n)], *[f"B_{i}_{j}" for j in range(n)]] for i in below]
     rows = _numbered(graph.inputs, [graph.outputs[name] for row in names for name in row])
@@ -120,22 +124,20 @@ def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows
 
 
 def _displaced(system: System) -> LinearRows:
-    """The rates (xi_dot, qdd) at a state moved by displacements xi, from 0; qdd alone where q is what moves."""
+    """The rates (xi_dot, qdd) at a state moved by displacements xi from 0, which where velocities are rates are q."""
     equations, kinematics, n = forward_dynamics(system), system.kinematics, system.n
-    names, nodes = equations.input_names, list(equations.outputs.values())[:n]  # without multipliers
-    if kinematics.quasi is None:
-        wrt = (*system.q, *system.qd, *system.tau)
-        return LinearRows(_numbered(equations.inputs, nodes), names, wrt, np.eye(n, 3 * n, n))
-    xi, build = cg.variables([f"xi:{i}" for i in range(n)]), Builder()
-    moves, brackets = folded(kinematics.rate(xi), build), kinematics.brackets(build)
-    with building(build):
-        at = {q: q + move for q, move in zip(system.q, moves, strict=True)}
-        rates = [
-            u + sum([c * x for c, x in zip(row, xi, strict=True)], ZERO)
-            for row, u in zip(brackets, system.qd, strict=True)
-        ]
-    graph = _numbered([*equations.inputs, *xi], [*rates, *folded(nodes, build, at)])
-    return LinearRows(graph, names, (*xi, *system.qd, *system.tau), np.empty((0, 3 * n)))
+    inputs, xi, rates = equations.inputs, system.q, system.qd
+    nodes, none = list(equations.outputs.values())[:n], np.empty((0, 3 * n))  # without multipliers
+    if kinematics.quasi is not None:
+        xi, build = cg.variables([f"xi:{i}" for i in range(n)]), Builder()
+        moves, brackets = folded(kinematics.rate(xi), build), kinematics.brackets(build)
+        with building(build):
+            at = {q: q + move for q, move in zip(system.q, moves, strict=True)}
+            turned = [sum([c * x for c, x in zip(row, xi, strict=True)], ZERO) for row in brackets]
+            rates = [u + turn for u, turn in zip(rates, turned, strict=True)]  # xi_dot = dqd + C xi
+        inputs, nodes = (*inputs, *xi), folded(nodes, build, at)
+    graph = _numbered(inputs, [*rates, *nodes])
+    return LinearRows(graph, equations.input_names, (*xi, *system.qd, *system.tau), none)
 
 
 def _numbered(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
@@ -202,7 +204,7 @@ def linearize(
 
     >>> pendulum = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0])
     >>> A, B = dyn.linearize(pendulum, [0.0, 0.0], [0.0, 0.0], form="momentum")
-    >>> A.round(3).tolist()
+    >>> (A.round(3) + 0.0).tolist()
     [[0.0, 0.0, 1.714, -4.286], [0.0, 0.0, -4.286, 13.714], [-19.62, -4.905, 0.0, 0.0], [-4.905, -4.905, 0.0, 0.0]]
     """
     system, state = as_system(model), {"q": q, "qd": qd, "tau": tau}

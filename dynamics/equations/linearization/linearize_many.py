@@ -69,11 +69,12 @@ def linearize_many(
     values = input_rows(system, found.inputs, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if values.ndim != 2:
         raise ValueError("linearize_many takes rows of states, got one state; see linearize")
-    rows = np.empty((len(values), 2 * n, 3 * n))
     if found.wrt:
         x = np.hstack([values, np.zeros((len(values), function.n_in - len(found.inputs)))])
-        rows[:, len(found.above) :] = function.jacobian(x, wrt=found.wrt, threads=threads)
+        x = x[0] if len(x) == 1 else x  # of one the columns fill vectors, not the states
+        rows = function.jacobian(x, wrt=found.wrt, threads=threads).reshape(-1, 2 * n, 3 * n)
     else:
+        rows = np.empty((len(values), 2 * n, 3 * n))
         function.batch(values.T, threads, out=rows.reshape(-1, 6 * n * n)[:, found.above.size :].T)
     return matrices(rows, found)
 

@@ -89,30 +89,42 @@ def doubts(stats: EnsembleStats) -> list[str]:
     return said
 
 
-class RunTable:
-    """Statistics of runs side by side, a row of `Stats` each, set as they end.
+class Part:
+    """Results of trajectories first, first + 1, ..: rows (k, T, m), NaN after one has stopped, and their statistics.
 
-    columns: {name: of all}.
+    columns: {name of `EnsembleStats`: of each}, and "happened", the events of each.
     """
 
-    def __init__(self, count: int) -> None:
-        self.columns: dict[str, Any] = {name: np.zeros(count, dtype=kind) for name, kind in COLUMNS.items()}
+    def __init__(self, first: int, rows: Array) -> None:
+        """Before the first step; rows: where they are to be."""
+        self.first, self.rows = first, rows
+        kinds = {**COLUMNS, "happened": np.object_}
+        self.columns: dict[str, Any] = {name: np.zeros(len(rows), dtype=kind) for name, kind in kinds.items()}
         self.put(slice(None), status=-1, error=np.nan, error_at_end=np.nan, message="")
         self.columns["warnings"].fill(())
+        self.columns["happened"].fill(())
 
     def put(self, which: Any, **columns: Any) -> None:
-        """Set columns in these rows."""
+        """Set columns of these."""
         for name, values in columns.items():
             self.columns[name][which] = values
 
     def reached(self, which: Any, **columns: Any) -> None:
-        """Set these rows, of runs that reached their end."""
+        """Set columns of these, which reached their end."""
         self.put(which, **columns, success=True, status=0, message=REACHED)
+
+    def place(self, part: Part) -> None:
+        """Put the results of a part in their place."""
+        here = slice(part.first, part.first + len(part.rows))
+        if not np.may_share_memory(part.rows, self.rows):  # from another process
+            self.rows[here] = part.rows
+        self.put(here, **part.columns)
 
     def stats(self, method: str, seconds: float) -> EnsembleStats:
         """The statistics."""
-        texts = {name: tuple(self.columns[name].tolist()) for name in ("message", "warnings")}
-        return EnsembleStats(method, seconds=seconds, **{**self.columns, **texts})
+        columns = {name: self.columns[name] for name in COLUMNS}
+        columns |= {name: tuple(columns[name].tolist()) for name in ("message", "warnings")}
+        return EnsembleStats(method, seconds=seconds, **columns)
 
 
 @dataclass(frozen=True)
@@ -197,11 +209,12 @@ class Ensemble:
         (np.float64(-0.416), np.float64(4.0))
         """
         module, (many, rows, _) = _module("pandas"), self.q.shape
-        blocks = {"q": (self.coordinates, self.q), "qd": (self.velocities, self.qd), "p": (self.velocities, self.p)}
+        blocks = {"q": (self.coordinates, self.q), "qd": (self.velocities, self.qd)}
+        blocks |= {} if self.p is None else {"p": (self.velocities, self.p)}
         columns = {
             f"{letter}.{name}": values[:, :, k].reshape(-1)
             for letter, (names, values) in blocks.items()
-            for k, name in enumerate(names if values is not None else ())
+            for k, name in enumerate(names)
         }
         message = np.array(self.stats.message, object)
         own = {**self.parameters, "success": self.stats.success, "message": message}

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from functools import partial
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,34 +29,26 @@ FEW_TRAJECTORIES = 32  # trajectories: fewer by chosen steps are done one by one
 VECTOR = 8  # lanes, or a multiple of them, of every processor
 PASSES = 64  # of the first block, before it is known how long one takes
 ROWS = 2**22  # numbers in the rows of lanes, at most
-RESULTS = ("status", "t", "trials", "rejected", "evaluations", "at_limit", "longest_made")
+RESULTS = ["status", "t", "trials", "rejected", "evaluations", "at_limit", "longest_made"]
 
 Stopped = Callable[[], bool]
-See = Callable[[Array, Array], None]
-
-
-class Lanes(NamedTuple):
-    """A program of steps, and its code for lanes."""
-
-    program: StepProgram
-    code: LaneCode | VectorCode
 
 
 class VectorCode:
     """`LaneCode` of equal steps without machine code: all memories go together, in NumPy's vectors.
 
-    A step that fails may leave a finite state, and the next may not: where steps iterate, its memory makes no more.
+    stops: whether the memory of a step that failed makes no more, for its state may be finite, and the next not fail.
     """
 
-    def __init__(self, steps: Program, *, live: bool) -> None:
-        registers, body, (failed,) = {**steps.registers, "live": 1}, list(steps.body), cg.variables(["nonfinite"])
-        if live:
-            judged = Call(Graph([failed], {"live": cg.where(failed, 0.0, 1.0)}), ("nonfinite",), ("live",))
-            body = [judged, If("live", tuple(body))]
+    def __init__(self, steps: Program, *, stops: bool) -> None:
+        failed, registers, body = cg.variable("nonfinite"), {**steps.registers, "live": 1}, steps.body
+        if stops:
+            live = Call(Graph([failed], {"live": cg.where(failed, 0.0, 1.0)}), ("nonfinite",), ("live",))
+            body = [live, If("live", tuple(steps.body))]
         self._runner = runner(replace(steps, registers=registers, body=body, stop=None), "python")
-        places, self.size, self.width = np.arange(self._runner.size), self._runner.size, steps.width
-        held = {name: self._runner.read(places, name) for name, length in registers.items() if length}
-        self.numbers = {name: slice(int(at[0]), int(at[-1]) + 1) for name, at in held.items()}
+        self.size, self.width = self._runner.size, steps.width
+        places = {name: self._runner.read(np.arange(float(self.size)), name) for name in registers}
+        self.numbers = {name: slice(int(at[0]), int(at[-1]) + 1) for name, at in places.items() if len(at)}
 
     def __call__(self, memories: Array, which: Numbers, passes: Numbers, most: int, rows: Array, marks: Array) -> None:
         """As `LaneCode`."""
@@ -70,21 +63,25 @@ class VectorCode:
         memories[which], passes[which] = memory.T, (done, mark)
 
 
+Code: TypeAlias = LaneCode | VectorCode
+
+
 @kept_by_first
-def lanes_of(program: StepProgram, backend: str, fma: bool) -> Lanes | None:
-    """The lanes of a program; None of chosen steps in Python, and where a statement has no vectors."""
-    if not program.adaptive:  # sines are those of vectors
-        if replace(program.steps, stop=None).alone:
-            return None
-        own = runner(program.steps, backend, fma=fma)
-        code = own.lane_code("count", ("t", "evaluations", "nonfinite"), alike=False)
-        return Lanes(program, code or VectorCode(program.steps, live=iterates(program)))
-    toward, t = inputs = cg.variables("toward t")
-    clock = Call(Graph(inputs, {"clock": toward * t}), ("lanes.toward", "t"), ("lanes.clock",))
-    lengths = {**program.steps.registers, "lanes.toward": 1, "lanes.clock": 1}
-    steps = replace(program.steps, registers=lengths, body=[*program.steps.body, clock])
-    code = runner(steps, backend, fma=fma).lane_code("lanes.clock", RESULTS)
-    return None if code is None else Lanes(program, code)
+def lanes_of(program: StepProgram, backend: str, fma: bool) -> Code | None:
+    """The code of lanes; None of chosen steps in Python, and where a statement has no vectors.
+
+    Sines of equal steps are those of vectors.
+    """
+    steps, clock, results = program.steps, "count", ["t", "evaluations", "nonfinite"]
+    if program.adaptive:
+        toward, t = inputs = cg.variables("toward t")
+        body = Call(Graph(inputs, {"clock": toward * t}), ("lanes.toward", "t"), ("lanes.clock",))
+        lengths = {**steps.registers, "lanes.toward": 1, "lanes.clock": 1}
+        steps, clock, results = replace(steps, registers=lengths, body=[*steps.body, body]), "lanes.clock", RESULTS
+    code = runner(steps, backend, fma=fma).lane_code(clock, results, alike=program.adaptive)
+    if code is None and not program.adaptive and not replace(steps, stop=None).alone:
+        return VectorCode(steps, stops=iterates(program))
+    return code
 
 
 @kept_by_first
@@ -113,8 +110,8 @@ class _Memories:
     passes: how many each has made, and how many marks of its clock passed, (k, 2).
     """
 
-    def __init__(self, lanes: Lanes, count: int, values: Mapping[str, ArrayLike]) -> None:
-        self._code, self._memories, self._most = lanes.code, np.zeros((count, lanes.code.size)), PASSES
+    def __init__(self, code: Code, count: int, values: Mapping[str, ArrayLike]) -> None:
+        self._code, self._memories, self._most = code, np.zeros((count, code.size)), PASSES
         self.passes = np.zeros((count, 2), np.int64)
         self.set(values)
 
@@ -127,31 +124,28 @@ class _Memories:
         """A number of each."""
         return self._memories[:, self._code.numbers[name]][:, 0]
 
-    def rows(
-        self, marks: Array, going: Callable[[], Flags], left: Callable[[Numbers], float], stopped: Stopped
-    ) -> Array:
-        """Go on until none is going: the rows (k, len(marks), width), NaN in time of those that are not there.
+    def rows(self, marks: Array, going: Callable[[], tuple[Numbers, float]], stopped: Stopped) -> Array:
+        """Go on until none is going: the rows (k, len(marks), width), NaN in time of those not there.
 
-        left: passes that these may make before they are asked again.  Raises StoppedError after `stopped`.
+        going: those that are, and how many passes they may make.  Raises StoppedError after `stopped`.
         """
         rows = np.empty((len(self._memories), len(marks), self._code.width))
         rows[:, :, 0] = np.nan
         self.passes[:, 1] = 0
-        while len(which := np.flatnonzero(going())):
+        which, left = going()
+        while len(which):
             if stopped():
                 raise StoppedError
-            begin, most = time.perf_counter(), int(min(self._most, left(which)))
+            begin, most = time.perf_counter(), int(min(self._most, left))
             self._code(self._memories, which, self.passes, most, rows, marks)
             if most == self._most:
                 self._most = max(1, int(most * min(4.0, BLOCK_TIME / max(time.perf_counter() - begin, 1e-9))))
+            which, left = going()
         return rows
 
 
-class LaneRuns(NamedTuple):
-    """Flags of runs that reached their end without a remark on their course, (k,), and columns of their statistics."""
-
-    whole: Flags
-    columns: dict[str, Array]
+# Of runs: flags of those that reached their end without a remark on their course, (k,), and columns of statistics.
+LaneRuns: TypeAlias = tuple[Flags, dict[str, Array]]
 
 
 class Leg(NamedTuple):
@@ -165,22 +159,22 @@ class Leg(NamedTuple):
     places: list[tuple[slice, slice | Numbers]]
 
 
-def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> list[Leg]:
+def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> Iterator[Leg]:
     """The legs of runs that keep tables of rows, after so many steps each, (T,).
 
     every: all steps are marks, so many of a leg; 0: those that the tables ask for, and the last of a grid.
     """
-    legs, done = list[Leg](), 0
-    asked = np.unique(np.concatenate([*tables, np.cumsum([grid.steps for grid in grids])]))
+    done, asked = 0, tables[0] if len(tables) == 1 else np.unique(np.concatenate(tables))
     for grid in grids:
-        inside = slice(*np.searchsorted(asked, [done + 1, done + grid.steps + 1]).tolist())
-        marks = done + np.arange(1, grid.steps + 1) if every else asked[inside]
-        for part in np.split(marks, range(every, len(marks), every) if every else []):
-            here = [slice(*np.searchsorted(numbers, [part[0], part[-1] + 1]).tolist()) for numbers in tables]
-            there = [np.searchsorted(part, numbers[rows]) for numbers, rows in zip(tables, here, strict=True)]
-            legs.append(Leg(grid, part - float(done), list(zip(here, map(_together, there), strict=True))))
-        done += grid.steps
-    return legs
+        end = done + grid.steps
+        marks = asked[slice(*asked.searchsorted((done + 1, end + 1)))]
+        marks = marks if len(marks) and marks[-1] == end else np.append(marks, end)
+        all_steps = (np.arange(k, min(k + every, end + 1)) for k in range(done + 1, end + 1, every or end))
+        for part in all_steps if every else [marks]:
+            here = [slice(*numbers.searchsorted((part[0], part[-1] + 1)).tolist()) for numbers in tables]
+            there = [_together(part.searchsorted(numbers[rows])) for numbers, rows in zip(tables, here, strict=True)]
+            yield Leg(grid, np.array(part - done, dtype=np.float64), list(zip(here, there, strict=True)))
+        done = end
 
 
 def _together(at: Numbers) -> slice | Numbers:
@@ -189,62 +183,65 @@ def _together(at: Numbers) -> slice | Numbers:
 
 
 def equal_in_lanes(
-    lanes: Lanes,
+    code: Code,
     x: Array,
     p: Array,
-    legs: Sequence[Leg],
+    legs: Iterable[Leg],
     tables: Sequence[Array],
     stopped: Stopped,
-    see: See | None = None,
+    watch: Callable[[Array, Array], None] | None = None,
 ) -> LaneRuns:
     """Runs by equal steps from states x (k, m) with parameters p (k, ..).
 
-    tables: receive states, (k, T, m), NaN from where a run has not come to.  see: is told those of all marks, and when.
+    tables: receive states, (k, T, m), NaN from where a run has not come to.  watch: is told those of all marks.
     """
-    run, m, steps = _Memories(lanes, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0
-    for (first, _), rows in zip(legs[0].places, tables, strict=True):
-        rows[:, : first.start] = x[:, None]  # the start
+    run, m, steps, longest = _Memories(code, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0, 0.0
     at = 0.0  # steps of the grid
     for grid, marks, places in legs:
         if at == 0.0:
             run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
             run.passes[:, 0] = 0
-        at = marks[-1]
-        block = run.rows(
-            marks,
-            lambda at=at: (run.read("nonfinite") == 0.0) & (run.passes[:, 0] < at),
-            lambda which, at=at: float(at - run.passes[which[0], 0]),
-            stopped,
-        )[:, :, 1 : 1 + m]
+            longest = max(longest, abs(grid.h))
+        for (here, _), rows in zip(places, tables, strict=True) if not steps and at == 0.0 else ():
+            rows[:, : here.start] = x[:, None]  # the start
+        at = float(marks[-1])
+        block = run.rows(marks, partial(_going, run, at), stopped)[:, :, 1 : 1 + m]
         if (run.passes[:, 1] < len(marks)).any():
             block[np.arange(len(marks)) >= run.passes[:, 1:]] = np.nan
         for (here, there), rows in zip(places, tables, strict=True):
             rows[:, here] = block[:, there]
-        if see is not None:
-            see(grid.begin + marks * grid.h, block)
+        if watch is not None:
+            watch(grid.begin + marks * grid.h, block)
         if at == grid.steps:
             at, steps = 0.0, steps + grid.steps
-    longest = max([abs(leg.grid.h) for leg in legs])
     columns = {"steps": np.full(len(x), steps), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
-    return LaneRuns(run.read("nonfinite") == 0.0, columns)
+    return run.read("nonfinite") == 0.0, columns
 
 
-def chosen_in_lanes(lanes: Lanes, options: RunOptions, x: Array, p: Array, rows: Array, stopped: Stopped) -> LaneRuns:
+def _going(run: _Memories, steps: float) -> tuple[Numbers, float]:
+    """Runs that are on their way to so many steps of a grid, and how many are left to them."""
+    which = np.flatnonzero((run.read("nonfinite") == 0.0) & (run.passes[:, 0] < steps))
+    return which, steps - run.passes[which[0], 0] if len(which) else 0.0
+
+
+def chosen_in_lanes(
+    code: Code, program: StepProgram, options: RunOptions, x: Array, p: Array, rows: Array, stopped: Stopped
+) -> LaneRuns:
     """Runs by chosen steps from states x (k, m) with parameters p (k, ..).
 
     rows: (k, T, m), receives the states at the times of the options, NaN from where a run has not come to.
     """
-    program, most = lanes.program, options.max_steps
     first = int(options.row_times[0] == options.t0)  # the first row that a step makes
     start = beginning(options, max(options.relative, program.finest)) | over(options.t0, options.t_end)
     values = {"x": x, "p": p, TOLERANCE: tolerance(options), "lanes.toward": options.direction}
-    run = _Memories(lanes, len(x), start | values)
-    made = run.rows(
-        options.direction * options.row_times[first:],
-        lambda: (run.read("status") == 0.0) & (run.read("trials") < most),
-        lambda which: most - float(run.read("trials")[which].max()),
-        stopped,
-    )
+    run = _Memories(code, len(x), start | values)
+
+    def going() -> tuple[Numbers, float]:
+        trials = run.read("trials")
+        which = np.flatnonzero((run.read("status") == 0.0) & (trials < options.max_steps))
+        return which, options.max_steps - trials[which].max(initial=0.0)
+
+    made = run.rows(options.direction * options.row_times[first:], going, stopped)
     rows[:, :first] = x[:, None]
     rows[:, first:] = _states(program, made, options.row_times[first:])
     rows[:, first:][np.arange(made.shape[1]) >= run.passes[:, 1:]] = np.nan
@@ -252,7 +249,7 @@ def chosen_in_lanes(lanes: Lanes, options: RunOptions, x: Array, p: Array, rows:
     whole = (run.read("status") == DONE) & (run.read("at_limit") < HELD)
     rejected, longest = run.read("rejected"), np.minimum(run.read("longest_made"), options.longest_step)
     columns = {"steps": run.read("trials") - rejected, "rejected": rejected}
-    return LaneRuns(whole, {**columns, "nfev": run.read("evaluations"), "dt": longest})
+    return whole, {**columns, "nfev": run.read("evaluations"), "dt": longest}
 
 
 def _states(program: StepProgram, rows: Array, times: Array) -> Array:

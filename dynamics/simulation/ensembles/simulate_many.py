@@ -6,9 +6,8 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import closing, nullcontext
+from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 from typing import Unpack
 
 import numpy as np
@@ -18,11 +17,11 @@ from cgraph import Node
 from cgraph._shared import Array, require_path, require_whole
 
 from ...equations.state_equation import FORMS
-from ...equations.states.initial_value import InitialValues, initial_values
-from ...integrators import Problem, derive, in_form
+from ...equations.states.initial_value import initial_values
+from ...integrators import derive, in_form
 from ...systems.model import Model
 from ..applied_force import SampledController, with_applied
-from ..events.event import Event, EventProgram, as_events, event_program
+from ..events.event import Event, as_events, event_program
 from ..outcome import split_crossings
 from ..progress_bar import Progress
 from ..run_options import METHOD, Options, RunOptions, require_room, time_span
@@ -31,12 +30,10 @@ from ..steps.row_values import converted
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
 from ..unreached_momenta import unreached_momenta
-from .ensemble import Ensemble, doubts
+from .ensemble import Ensemble, Part, doubts
 from .store import Store, sweep_of
-from .task import Chunk, Part, Task, not_begun
+from .task import Chunk, Task
 from .workers import Team, Workers, checked, finished
-
-UNKNOWN = 16  # workers behind a map, which does not say
 
 
 class ManyOptions(Options, total=False):
@@ -135,70 +132,90 @@ def simulate_many(
     """
     # Check
     chunk, form = options.pop("chunk", None), options.pop("form", FORMS[0])
-    folder = _check(chunk, tau, store)
+    if chunk is not None:
+        require_whole("chunk", chunk, 1)
+    force: object = tau
+    if isinstance(force, SampledController):
+        what = "call simulate for each start, or write the controller in closed form"
+        raise TypeError(f"a SampledController may remember what it has seen, and so controls one run: {what}")
+    folder = None if store is None else require_path("store", store)
     t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
     run = RunOptions.of(method, options, t0, t_end, t_eval, without=["dense_output"])
     watched, team = as_events(events), checked(workers)
     applied = with_applied(model, tau, parameters)
     start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
     run.check(start.states)
-    _require_room(run, *start.x.shape, stored=store is not None)
+    _require_room(run, *start.x.shape, stored=folder is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
     program = step_program(problem, run.integrator, dense=bool(watched) or run.between)
-    watch = event_program(problem, watched)
+    watch, nq = event_program(problem, watched), problem.nq
 
     # Integrate, by whoever takes the chunks and compiles the steps
     sent = replace(run, t_eval=run.row_times) if watched else run
     task = Task(program, sent, len(start.x), watch if watched else None)
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
-    width = task.width(chunk, team if isinstance(team, int) else UNKNOWN, stored=folder is not None)
-    with (
-        nullcontext()
-        if folder is None
-        else closing(Store(folder, sweep_of(problem, task, x, p), width, (len(x), task.count, x.shape[1])))
-    ) as kept:
-        whole = _run_chunks(task, x, p, width, team, kept)
+    width, shape = task.width(chunk, team, stored=folder is not None), (len(x), task.count, x.shape[1])
+    if folder is None:
+        whole = _run_chunks(task, x, p, width, team)
+    else:
+        with closing(Store(folder, sweep_of(problem, task, x, p), width, shape)) as kept:
+            whole = _run_chunks(task, x, p, kept.width, team, kept)
 
     # Put the result together
-    result = _ensemble(problem, watch, run, whole, (start, x, p), time.perf_counter() - begin)
-    for text in doubts(result.stats):
+    times, rows = run.row_times, whole.rows
+    logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.columns["happened"]) if watched]
+    for k in range(len(x)) if problem.missing is not None else ():
+        missed = unreached_momenta(problem, times, rows[k], p[k], start=(t0, start.x[k], x[k]))
+        whole.columns["warnings"][k] += tuple(missed)
+    stats = whole.stats(method, time.perf_counter() - begin)
+    for text in doubts(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    return result
+    return Ensemble(
+        times,
+        rows[:, :, :nq],
+        converted(problem.velocities, times, rows, p[:, None])[:, :, nq:],
+        stats,
+        {event.name: tuple([named[event.name] for named in logs]) for event in watch.events},
+        rows[:, :, nq:] if problem.momenta else None,
+        start.x[:, :nq],
+        start.x[:, nq:],
+        start.varied,
+        problem.model.coordinates,
+        problem.model.velocities,
+    )
 
 
 def ends_of(task: Task, x: Array, p: Array, workers: Workers) -> Array:
     """The last rows (N, m) of motions from states x (N, m) with parameters p (N, ..); NaN, with a warning, of some."""
     team, rows = checked(workers), np.empty((len(x), 1, x.shape[1]))
     with np.errstate(all="ignore"):
-        here = team == 1 and task.width(len(x), 1, stored=False) >= len(x)
-        found = task.run_lanes(x, p, rows, lambda: False) if here else None
-    if found is None or not found.whole.all() or any(found.columns.get("warnings", ())):
-        width = task.width(None, team if isinstance(team, int) else UNKNOWN, stored=False)
-        whole = _run_chunks(task, x, p, width, team, None)
+        found = task.run_lanes(x, p, rows, lambda: False) if team == 1 and len(x) <= task.largest else None
+    if found is None or not found[0].all() or any(found[1].get("warnings", ())):
+        whole = _run_chunks(task, x, p, task.width(None, team), team)
         rows = whole.rows
-        for text in doubts(whole.runs.stats(task.options.method, 0.0)):
+        for text in doubts(whole.stats(task.options.method, 0.0)):
             warnings.warn(text, SimulationWarning, stacklevel=3)
     return rows[:, 0]
 
 
-def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None) -> Part:
+def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None = None) -> Part:
     """Run the chunks, by whoever shares them, until all parts have come.
 
     Those that a store has are taken from there, and others are kept there as they end.
     Raises ValueError unless all parts come.
     """
     rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
-    whole, width = not_begun(0, rows, events=task.events is not None), width if store is None else store.width
-    chunks, done = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)], 0
+    whole, came = Part(0, rows), dict[int, int]()  # trajectories, by the first
+    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
     if store is not None:
-        known = [part for chunk in chunks if (part := store.part(chunk)) is not None]
-        for part in known:
-            whole.put(part)
-        done, there = sum([len(part.rows) for part in known]), {part.first for part in known}
-        chunks = [chunk for chunk in chunks if chunk.first not in there]
+        known = {chunk.first: part for chunk in chunks if (part := store.part(chunk)) is not None}
+        for part in known.values():
+            whole.place(part)
+            came[part.first] = len(part.rows)
+        chunks = [chunk for chunk in chunks if chunk.first not in known]
         if chunks:
             store.lock()
     try:
@@ -207,20 +224,21 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
             closing(finished(task, chunks, workers, whole.rows)) as parts,
         ):
             for part in parts:
-                whole.put(part)
+                whole.place(part)
                 if store is not None:
                     store.keep(part)
-                done += len(part.rows)
-                report(done)
+                came[part.first] = len(part.rows)
+                report(sum(came.values()))
     except KeyboardInterrupt:
         if store is None:
             raise
-        raise KeyboardInterrupt(store.kept(done)) from None
-    if done != len(x):
-        raise ValueError(
-            f"workers must give a result for each item, as map does: of {len(x)} trajectories came back {done}"
-        )
-    return whole if store is None else replace(whole, rows=store.read_only())
+        raise KeyboardInterrupt(store.kept(sum(came.values()))) from None
+    if (done := sum(came.values())) != len(x):
+        back = f"of {len(x)} trajectories came back {done}"
+        raise ValueError(f"workers must give a result for each item, as map does: {back}")
+    if store is not None:
+        whole.rows = store.read_only()
+    return whole
 
 
 def _require_room(options: RunOptions, many: int, m: int, *, stored: bool) -> None:
@@ -238,47 +256,3 @@ def _require_room(options: RunOptions, many: int, m: int, *, stored: bool) -> No
     what = f"{many} trajectories of {count} rows of {m} numbers"
     if not stored:
         require_room(8 * many * count * m, what, "record fewer times (t_eval), simulate fewer at once or name a store")
-
-
-def _ensemble(
-    problem: Problem,
-    watch: EventProgram,
-    options: RunOptions,
-    whole: Part,
-    starts: tuple[InitialValues, Array, Array],
-    seconds: float,
-) -> Ensemble:
-    """Ensemble of all that has come.  starts: as given, their states (N, m), and the parameters of the problem."""
-    times, rows, nq, (start, x, p) = options.row_times, whole.rows, problem.nq, starts
-    logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.happened)]
-    crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
-    for k in range(len(x)) if problem.missing is not None else ():
-        missed = unreached_momenta(problem, times, rows[k], p[k], start=(options.t0, start.x[k], x[k]))
-        whole.runs.columns["warnings"][k] += tuple(missed)
-    states = converted(problem.velocities, times, rows, p[:, None])
-    momenta = rows[:, :, nq:] if problem.momenta else None
-    return Ensemble(
-        times,
-        rows[:, :, :nq],
-        states[:, :, nq:],
-        whole.runs.stats(options.method, seconds),
-        crossings,
-        momenta,
-        start.x[:, :nq],
-        start.x[:, nq:],
-        start.varied,
-        problem.model.coordinates,
-        problem.model.velocities,
-    )
-
-
-def _check(chunk: int | None, tau: object, store: str | os.PathLike[str] | None) -> Path | None:
-    """The folder of a store. Raises for what is wrong with these arguments alone."""
-    if chunk is not None:
-        require_whole("chunk", chunk, 1)
-    if isinstance(tau, SampledController):
-        raise TypeError(
-            "a SampledController may remember what it has seen, and so controls one run: call simulate for each start, "
-            "or write the controller in closed form"
-        )
-    return None if store is None else require_path("store", store)

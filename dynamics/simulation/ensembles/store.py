@@ -7,7 +7,6 @@ import math
 import os
 import platform
 import shutil
-from collections.abc import Iterable
 from hashlib import blake2b
 from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
@@ -22,8 +21,8 @@ import cgraph as cg
 from cgraph._shared import Array, Json, atomic_write
 
 from ...integrators import Problem
-from .ensemble import COLUMNS, RunTable
-from .task import Chunk, Part, Task
+from .ensemble import COLUMNS, Part
+from .task import Chunk, Task
 
 if TYPE_CHECKING:
     import sqlite3
@@ -47,9 +46,8 @@ class Store:
 
     def __init__(self, folder: Path, sweep: dict[str, Json], width: int, shape: tuple[int, ...]) -> None:
         """Open the folder, or begin it. Raises ValueError where it keeps something else, OSError where it cannot be."""
-        self._folder = folder
+        self._folder, self._name, self.width = folder, f"store {str(folder)!r}", width
         self._lock: sqlite3.Connection | None = None
-        self.width = width
         folder.mkdir(parents=True, exist_ok=True)
         try:
             self._open(sweep, shape)
@@ -58,22 +56,24 @@ class Store:
             raise
 
     def _open(self, sweep: dict[str, Json], shape: tuple[int, ...]) -> None:
-        folder, width = self._folder, self.width
+        folder, known = self._folder, self._read()
         left_over = list(folder.glob(".*.tmp"))  # of files that a process was writing when it was ended
-        if left_over or not self._whole(shape[0]):
+        chunks = [self._file(first) for first in range(0, shape[0], known["chunk"])] if known else []
+        if left_over or not chunks or not all(path.exists() for path in chunks):  # else the folder is read alone
             self.lock()
             for path in left_over:
                 path.unlink(missing_ok=True)
-        if (folder / SWEEP).exists():
             known = self._read()
-            _require_same(folder, known, sweep)
-            self.width = int(known["chunk"])
+        if known:
+            for name, value in sweep.items():
+                if known.get(name) != value:
+                    there = f"there {name} is {known.get(name)!r:.60}, here {value!r:.60}"
+                    raise ValueError(f"{self._name} keeps another sweep: {there}")
+            self.width = known["chunk"]
         elif any(path.name != LOCK for path in folder.iterdir()):
-            raise ValueError(
-                f"store {str(folder)!r} is a folder with other files and without a sweep: name an empty one"
-            )
+            raise ValueError(f"{self._name} is a folder with other files and without a sweep: name an empty one")
         else:
-            atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": width}, indent=1))
+            atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": self.width}, indent=1))
         if not (folder / ROWS).exists():
             self._make_rows(shape)
         self.rows = self._table(shape)
@@ -94,11 +94,9 @@ class Store:
         except sqlite3.OperationalError as error:
             lock.close()
             if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
-                raise OSError(f"store {str(self._folder)!r} cannot be locked: {error}") from None
-            raise OSError(
-                f"store {str(self._folder)!r} is being written by another call of simulate_many, here or in another "
-                "process: wait for it, or name another folder"
-            ) from None
+                raise OSError(f"{self._name} cannot be locked: {error}") from None
+            other = "another call of simulate_many, here or in another process"
+            raise OSError(f"{self._name} is being written by {other}: wait for it, or name another folder") from None
         self._lock = lock
 
     def close(self) -> None:
@@ -107,45 +105,35 @@ class Store:
             self._lock.close()
             self._lock = None
 
-    def _whole(self, count: int) -> bool:
-        """Whether all chunks of so many trajectories are there, so that the folder is read alone."""
-        if not (self._folder / SWEEP).exists():
-            return False
-        return all(self._file(first).exists() for first in range(0, count, int(self._read()["chunk"])))
-
     def kept(self, done: int) -> str:
         """Sentence on what the folder has of a sweep that was interrupted."""
-        return f"store {str(self._folder)!r} keeps {done} of {len(self.rows)} trajectories: the same call goes on"
+        return f"{self._name} keeps {done} of {len(self.rows)} trajectories: the same call goes on"
 
     def part(self, chunk: Chunk) -> Part | None:
         """The results of a chunk, if they are there."""
-        rows, runs = self.rows[chunk.first : chunk.first + len(chunk.x)], RunTable(len(chunk.x))
+        part = Part(chunk.first, self.rows[chunk.first : chunk.first + len(chunk.x)])
         try:
             with np.load(self._file(chunk.first), allow_pickle=False) as kept:
-                runs.put(slice(None), **{name: kept[name] for name in NUMBERS})
+                part.put(slice(None), **{name: kept[name] for name in NUMBERS})
                 texts, checksum = json.loads(kept["texts"].tobytes()), int(kept["checksum"])
         except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # not there, or damaged: the chunk is run again
             return None
-        if crc32(rows.data) != checksum:
-            return None
-        runs.put(slice(None), message=texts["messages"])
+        part.put(slice(None), message=texts["messages"])
         for k, said in enumerate(texts["warnings"]):
-            runs.put(k, warnings=tuple(said))
-        happened = [[(number, t, np.array(x)) for number, t, x in log] for log in texts["happened"]]
-        return Part(chunk.first, rows, runs, happened)
+            part.put(k, warnings=tuple(said))
+        for k, log in enumerate(texts["happened"]):
+            part.put(k, happened=[(number, t, np.array(x)) for number, t, x in log])
+        return part if crc32(part.rows.data) == checksum else None
 
     def keep(self, part: Part) -> None:
         """Write how the trajectories of a part went; their rows are in the table."""
         self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
-        columns, written = part.runs.columns, BytesIO()
-        happened = [[(number, t, x.tolist()) for number, t, x in log] for log in part.happened]
-        texts = {
-            "messages": columns["message"].tolist(),
-            "warnings": columns["warnings"].tolist(),
-            "happened": happened,
-        }
+        columns, written = part.columns, BytesIO()
+        happened = [[(number, t, x.tolist()) for number, t, x in log] for log in columns["happened"]]
+        texts = {"messages": columns["message"].tolist(), "warnings": columns["warnings"].tolist()}
+        words = json.dumps({**texts, "happened": happened if any(happened) else []}).encode()
         checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
-        kept = {"texts": np.frombuffer(json.dumps(texts).encode(), np.uint8), "checksum": np.array(checksum, np.uint32)}
+        kept: dict[str, Any] = {"texts": np.frombuffer(words, np.uint8), "checksum": np.array(checksum, np.uint32)}
         np.savez(written, **kept, **{name: columns[name] for name in NUMBERS})
         atomic_write(self._file(part.first), written.getvalue())
 
@@ -158,21 +146,23 @@ class Store:
         return self._folder / f"chunk-{first:09d}.npz"
 
     def _read(self) -> dict[str, Any]:
+        """What the folder keeps; empty if nothing."""
         try:
             known = json.loads((self._folder / SWEEP).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return {}
         except ValueError:
             known = None
         if not isinstance(known, dict) or not isinstance(known.get("chunk"), int):
-            raise ValueError(f"store {str(self._folder)!r} is damaged: its {SWEEP} is not one that was written here")
+            raise ValueError(f"{self._name} is damaged: its {SWEEP} is not one that was written here")
         return known
 
     def _table(self, shape: tuple[int, ...]) -> Array:
         """The table, in its file. Raises ValueError for a file that was cut: a memory map would fill it with zeros."""
-        path, header = self._folder / ROWS, BytesIO()
+        path, header, damaged = self._folder / ROWS, BytesIO(), f"{self._name} is damaged: its {ROWS}"
         described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(header, described)
         size, expected = path.stat().st_size, header.tell() + 8 * math.prod(shape)
-        damaged = f"store {str(self._folder)!r} is damaged: its {ROWS}"
         if size != expected:
             raise ValueError(f"{damaged} has {size} bytes, not {expected}; {AGAIN}")
         try:
@@ -185,12 +175,12 @@ class Store:
 
     def _make_rows(self, shape: tuple[int, ...]) -> None:
         if any(self._folder.glob("chunk-*.npz")):
-            raise ValueError(f"store {str(self._folder)!r} is damaged: it has results of chunks, and no {ROWS}")
-        size, free = 8 * int(np.prod(shape)), shutil.disk_usage(self._folder).free
+            raise ValueError(f"{self._name} is damaged: it has results of chunks, and no {ROWS}")
+        size, free = 8 * math.prod(shape), shutil.disk_usage(self._folder).free
         if size > free:  # a write through a memory map would end the process
+            needed = f"{shape[0]} trajectories of {shape[1]} rows of {shape[2]} numbers, and {free / 2**30:.3g} GiB"
             raise OSError(
-                f"store {str(self._folder)!r} needs {size / 2**30:.3g} GiB for {shape[0]} trajectories of {shape[1]} "
-                f"rows of {shape[2]} numbers, and {free / 2**30:.3g} GiB are free: record fewer times (t_eval)"
+                f"{self._name} needs {size / 2**30:.3g} GiB for {needed} are free: record fewer times (t_eval)"
             )
         made = self._folder / f".{ROWS}.{os.getpid()}.tmp"
         try:
@@ -201,7 +191,7 @@ class Store:
         except OSError as error:
             made.unlink(missing_ok=True)
             needs = f"needs a {ROWS} of {size / 2**30:.3g} GiB, which cannot be made"
-            raise OSError(error.errno, f"store {str(self._folder)!r} {needs}: {error.strerror}") from None
+            raise OSError(error.errno, f"{self._name} {needs}: {error.strerror}") from None
         made.replace(self._folder / ROWS)
 
 
@@ -219,42 +209,26 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "llvmlite": _version("llvmlite"),
         "machine": platform.machine(),
         **{name: getattr(options, name) for name in ("method", "backend", "fma", "estimate_error")},
-        **{name: _number(getattr(options, name)) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
-        "max_steps": _number(options.max_steps),
+        **{name: getattr(options, name) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
+        "max_steps": None if options.max_steps == math.inf else options.max_steps,
         "rtol": options.relative,
         "atol": np.asarray(options.absolute, dtype=np.float64).tolist(),
-        "times": _digest([options.row_times.tobytes()]),
+        "times": _digest(options.row_times.tobytes()),
         "states": program.components,
         "varied": problem.parameters,
         "events": [f"{event.name} {event.direction} {event.terminal}" for event in watched],
-        "model": _digest([cg.structure_hash(graph).encode() for graph in [*model, *events] if graph is not None]),
-        "steps": _digest([cg.structure_hash(graph).encode() for graph in program.steps.graphs()]),
+        "model": _digest(*[cg.structure_hash(graph).encode() for graph in [*model, *events] if graph is not None]),
+        "steps": _digest(*[cg.structure_hash(graph).encode() for graph in program.steps.graphs()]),
         "trajectories": len(x),
-        "starts": _digest([x.tobytes()]),
-        "parameters": _digest([p.tobytes()]),
+        "starts": _digest(x.tobytes()),
+        "parameters": _digest(p.tobytes()),
     }
-    sweep: dict[str, Json] = json.loads(json.dumps(given))
+    sweep: dict[str, Json] = json.loads(json.dumps(given, default=float))
     return sweep
 
 
-def _require_same(folder: Path, known: dict[str, Any], sweep: dict[str, Json]) -> None:
-    for name, value in sweep.items():
-        if known.get(name) != value:
-            raise ValueError(
-                f"store {str(folder)!r} keeps another sweep: there {name} is {known.get(name)!r:.60}, "
-                f"here {value!r:.60}"
-            )
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or value == math.inf else float(value)
-
-
-def _digest(parts: Iterable[bytes]) -> str:
-    digest = blake2b(digest_size=16)
-    for part in parts:
-        digest.update(part)
-    return digest.hexdigest()
+def _digest(*parts: bytes) -> str:
+    return blake2b(b"".join(parts), digest_size=16).hexdigest()
 
 
 def _version(package: str) -> str:

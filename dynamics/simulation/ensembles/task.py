@@ -12,21 +12,20 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..estimates.error_estimate import ASIDE, RunsBeside, error_estimates, runs_beside
-from ..estimates.unresolved import Watch, is_watched
+from ..estimates.error_estimate import ASIDE, Comparison, RunsBeside, error_estimates, runs_beside
+from ..estimates.unresolved import Watch
 from ..events.event import EventProgram
-from ..events.event_log import Happening
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..stepper import ChosenStepper, Stepper, stepper
-from ..steps.equal_steps import EqualSteps, even_steps, numbers_of
+from ..steps.equal_steps import EqualSteps, Numbers, even_steps
 from ..steps.step_program import StepProgram, compile_steps
-from .ensemble import COLUMNS, RunTable
+from .ensemble import COLUMNS, Part
 from .lanes import (
     ROWS,
     VECTOR,
+    Code,
     LaneRuns,
-    Lanes,
     Leg,
     Stopped,
     chosen_in_lanes,
@@ -39,6 +38,7 @@ from .lanes import (
 LARGEST_CHUNK = 256  # trajectories in a chunk one by one, unless asked for
 LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have at most `ROWS` numbers
 SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
+UNKNOWN = 16  # workers behind a map, which does not say
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
 
 
@@ -51,77 +51,38 @@ class Chunk:
     p: Array
 
 
-@dataclass(frozen=True)
-class Part:
-    """Results of a chunk, or of all: rows (k, T, m), NaN after a trajectory has stopped, and the runs' statistics."""
-
-    first: int
-    rows: Array
-    runs: RunTable
-    happened: list[list[Happening]]  # the events of each, if any are looked for
-
-    def put(self, part: Part) -> None:
-        """Put the results of a part in their place."""
-        here = slice(part.first, part.first + len(part.rows))
-        if not np.may_share_memory(part.rows, self.rows):  # from another process
-            self.rows[here] = part.rows
-        self.runs.put(here, **part.runs.columns)
-        self.happened[here] = part.happened
-
-
-def not_begun(first: int, rows: Array, *, events: bool) -> Part:
-    """The part of the chunk whose rows are to be here, before its first step."""
-    return Part(first, rows, RunTable(len(rows)), [[] for _ in rows] if events else [])
-
-
-@dataclass(frozen=True)
 class Task:
     """The function that runs chunks. It goes to other processes as it is, and is compiled there once.
 
-    many: trajectories, of all chunks.
+    count: rows of a trajectory.  largest: trajectories in a chunk at most, if they go in lanes, else 0.
     """
 
-    program: StepProgram
-    options: RunOptions
-    many: int
-    events: EventProgram | None = None
+    def __init__(
+        self, program: StepProgram, options: RunOptions, many: int, events: EventProgram | None = None
+    ) -> None:
+        """many: trajectories, of all chunks."""
+        self.program, self.options, self.events, self._many = program, options, events, many
+        self._grids: list[EqualSteps] = []
+        if not program.adaptive:
+            self._grids, self._numbers = even_steps(options.instants, options.step)
+        self._beside: RunsBeside | None = None
+        self.count, self.largest = len(options.row_times), 0
+        if events is None and fits_lanes(program, options, self._grids, many):
+            self._beside = runs_beside(self._grids, program.order) if options.estimated else None
+            rows = self.count if self._beside is None else self.count + len(self._beside.t)
+            self.largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // (program.steps.width * rows)))
 
-    @cached_property
-    def count(self) -> int:
-        """Rows of a trajectory."""
-        return len(self.options.row_times)
-
-    @cached_property
-    def grids(self) -> list[EqualSteps]:
-        """Equal steps; none of chosen ones."""
-        return [] if self.program.adaptive else even_steps(self.options.instants, self.options.step)
-
-    @cached_property
-    def beside(self) -> RunsBeside | None:
-        """Runs beside those in lanes; None where no error is estimated."""
-        return runs_beside(self.grids, self.program.order) if self.options.estimated else None
-
-    @cached_property
-    def in_lanes(self) -> bool:
-        """Whether trajectories go in lanes, if the program can."""
-        return self.events is None and fits_lanes(self.program, self.options, self.grids, self.many)
-
-    def width(self, chunk: int | None, workers: int, *, stored: bool) -> int:
-        """Trajectories in a chunk.
+    def width(self, chunk: int | None, workers: object, *, stored: bool = False) -> int:
+        """Trajectories in a chunk: in lanes, of whole vectors.
 
         chunk: as asked for.  stored: whether a chunk that has not ended is lost when the process is, so that it should
-        be small. Chunks in lanes are of whole vectors.
+        be small.
         """
-        if not self.in_lanes:
-            largest, shares = LARGEST_CHUNK, SHARES
-        else:
-            numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
-            largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers))
-            chunk = chunk and min(chunk, largest)
-            largest = min(largest, LARGEST_CHUNK) if stored else largest
-            shares = 1 if self.grids and self.many * self.grids[0].steps <= SHORT else SHARES
-        chunk = chunk or min(largest, math.ceil(self.many / (shares * workers)))
-        return math.ceil(chunk / VECTOR) * VECTOR if self.in_lanes and self.grids else int(chunk)
+        largest, equal = self.largest or chunk or LARGEST_CHUNK, self.largest and self._grids
+        shares = 1 if equal and self._many * self._grids[0].steps <= SHORT else SHARES
+        shares *= workers if isinstance(workers, int) else UNKNOWN
+        width = min(chunk or min(math.ceil(self._many / shares), LARGEST_CHUNK if stored else largest), largest)
+        return math.ceil(width / VECTOR) * VECTOR if equal else width
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
@@ -132,12 +93,13 @@ class Task:
 
         Raises KeyboardInterrupt soon after Ctrl-C, and StoppedError after `stopped`.
         """
-        part, left = not_begun(chunk.first, rows, events=self.events is not None), range(len(chunk.x))
+        part, left = Part(chunk.first, rows), list(range(len(chunk.x)))
         with np.errstate(all="ignore"):
             if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
-                done = np.flatnonzero(found.whole)
-                part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
-                left = np.flatnonzero(~found.whole).tolist()  # which are made again, alone
+                whole, columns = found
+                left = np.flatnonzero(~whole).tolist()  # which are made again, alone
+                done = whole if left else slice(None)
+                part.reached(done, **{name: values[done] for name, values in columns.items()})
             self._one_by_one(chunk, part, left, stopped)
         return part
 
@@ -150,34 +112,44 @@ class Task:
         if lanes is None:
             return None
         if self.program.adaptive:
-            return chosen_in_lanes(lanes, self.options, x, p, rows, stopped)
-        (own, *others), beside = self._legs, self.beside
+            return chosen_in_lanes(lanes, self.program, self.options, x, p, rows, stopped)
+        (own, *others), beside = self._legs, self._beside
         if beside is None:
             return equal_in_lanes(lanes, x, p, own, [rows], stopped)
         watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
+        if watch.needed:  # which sees all steps, so many at once
+            every = max(1, ROWS // (len(x) * self.program.steps.width))
+            own = legs_of(self._grids, self._tables, every)
         states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
-        found = equal_in_lanes(lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None)
+        whole, columns = equal_in_lanes(
+            lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None
+        )
         for legs, each in zip(others, states[1:], strict=True):
             equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
-        steps = int(found.columns["steps"][0])
-        errors = error_estimates(self.program, self.options, beside.law, watch, steps, beside.t, states)
-        return LaneRuns(found.whole, found.columns | errors)
+        steps = int(columns["steps"][0])
+        errors = error_estimates(self.program, self.options, beside.law, watch, steps, Comparison(beside.t, [*states]))
+        return whole, columns | errors
 
     @cached_property
-    def _legs(self) -> list[list[Leg]]:
+    def _tables(self) -> list[Numbers]:
+        """How many equal steps are done at the rows, and when runs are looked at to be compared."""
+        times, numbers = self.options.times, self._numbers
+        rows = (
+            np.arange(numbers[-1] + 1) if times is None else numbers[int(times[0] != self.options.t0) :][: len(times)]
+        )
+        return [rows, *([] if self._beside is None else [self._beside.numbers])]
+
+    @cached_property
+    def _legs(self) -> list[Iterable[Leg]]:
         """Legs of the runs, and of those beside."""
-        rows = numbers_of(self.grids, self.options.row_times)
-        if self.beside is None:
-            return [legs_of(self.grids, [rows])]
-        at_once = max(1, ROWS // (min(self.many, LONGEST_CHUNK) * self.program.steps.width))
-        every = at_once if is_watched(self.program.rate) else 0
-        others = [legs_of(stretches, [numbers]) for stretches, numbers in self.beside.runs]
-        return [legs_of(self.grids, [rows, self.beside.numbers], every), *others]
+        beside = () if self._beside is None else self._beside.runs
+        others = [list(legs_of(stretches, [numbers])) for stretches, numbers in beside]
+        return [list(legs_of(self._grids, self._tables)), *others]
 
     @property
-    def _lanes(self) -> Lanes | None:
+    def _lanes(self) -> Code | None:
         """The code of lanes, if trajectories go there."""
-        if not self.in_lanes:
+        if not self.largest:
             return None
         with _lock:
             return lanes_of(self.program, self.options.backend, self.options.fma)
@@ -193,21 +165,19 @@ class Task:
             if run is None or self.events is not None:
                 run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
             run.set_parameters(p)
-            if (
-                has_end and isinstance(run, ChosenStepper) and run.log is None
-            ):  # steps need not be looked at if it is their only row
+            if has_end and isinstance(run, ChosenStepper) and run.log is None:  # steps need not be looked at
                 if run.unseen(x):
                     counts = {"steps": run.steps, "rejected": run.rejected, "nfev": run.evaluations, "dt": run.largest}
-                    part.runs.reached(k, **counts)
+                    part.reached(k, **counts)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue
                 run = stepper(compiled, self.options, p, stopped=stopped)  # whose first blocks are short: it says when
             stats, recorder = outcome(run, x, self.options)
             if stats.message.startswith(INTERRUPTED):
                 raise KeyboardInterrupt
-            part.runs.put(k, **{name: getattr(stats, name) for name in COLUMNS})
+            part.put(k, **{name: getattr(stats, name) for name in COLUMNS})
             if run.log is not None:
-                part.happened[k] = run.log.happened
+                part.put(k, happened=run.log.happened)
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
 

@@ -5,18 +5,17 @@ from __future__ import annotations
 import multiprocessing
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
-from contextlib import closing, suppress
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ThreadPoolExecutor, wait
+from contextlib import suppress
 from multiprocessing.pool import Pool
 from multiprocessing.process import BaseProcess
-from queue import Empty, SimpleQueue
 
 import numpy as np
 
 from cgraph._shared import Array, thread_count
 
-from ..stepper import StoppedError
-from .task import Chunk, Part, Task
+from .ensemble import Part
+from .task import Chunk, Task
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
 Team = int | Map | Executor  # number of threads, or who does the work
@@ -50,54 +49,56 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -
 
     Raises TypeError for a map that gives something else than results, RuntimeError for a process that was ended.
     """
-    if not isinstance(workers, int):
-        done = 0
-        try:
-            for part in _elsewhere(task, chunks, workers):
-                yield part
-                done += 1
-        except BrokenExecutor:
-            raise RuntimeError(
-                "a process of workers was ended from outside, as where memory runs out, when "
-                f"{done} of {len(chunks)} chunks were here"
-            ) from None
-    elif workers == 1 or len(chunks) <= 1:
-        for chunk in chunks:
-            yield task.run(chunk, _rows(table, chunk), lambda: False)
-    else:
-        with closing(_by_threads(task, chunks, min(workers, len(chunks)), table)) as parts:
-            yield from parts
+    if isinstance(workers, int):
+        stop = threading.Event()
 
+        def run(chunk: Chunk) -> Part:
+            return task.run(chunk, table[chunk.first : chunk.first + len(chunk.x)], stop.is_set)
 
-def _elsewhere(task: Task, chunks: Sequence[Chunk], workers: Map | Executor) -> Generator[Part, None, None]:
-    """The parts that others make, looked at: from an executor or a pool, or from their maps, as they end."""
-    pool = workers if isinstance(workers, Executor) else getattr(workers, "__self__", None)
-    parts: object
-    if isinstance(pool, Executor):
-        parts = _by_executor(pool, task, chunks)
-    elif isinstance(pool, Pool):
-        parts = _by_pool(pool, task, chunks)
-    else:
-        assert not isinstance(workers, Executor)
-        parts = workers(task, chunks)
-    if not isinstance(parts, Iterable):
-        raise TypeError(f"workers must give the results of the function, as map does, got {parts!r:.60}")
-    for part in parts:
-        if not isinstance(part, Part):
-            raise TypeError(
-                f"workers must give the results of the function, as map does, got {type(part).__name__}: {part!r:.60}"
-            )
-        yield part
-
-
-def _by_executor(pool: Executor, task: Task, chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
-    """The parts as they end, none of which is kept: an executor's own map waits for the first, and holds the others."""
-    waiting = {pool.submit(task, chunk) for chunk in chunks}
+        if workers == 1 or len(chunks) <= 1:
+            yield from map(run, chunks)
+            return
+        with ThreadPoolExecutor(min(workers, len(chunks))) as pool:  # which waits for its threads at any exit
+            try:
+                yield from _by_executor(pool, run, chunks)
+            finally:
+                stop.set()
+        return
+    done, wanted = 0, "workers must give the results of the function, as map does, got"
     try:
-        for future in as_completed(waiting):
-            waiting.discard(future)
-            yield future.result()
-            del future
+        results = _elsewhere(task, chunks, workers)
+        if not isinstance(results, Iterable):
+            raise TypeError(f"{wanted} {results!r:.60}")
+        for part in results:
+            if not isinstance(part, Part):
+                raise TypeError(f"{wanted} {type(part).__name__}: {part!r:.60}")
+            yield part
+            done += 1
+    except BrokenExecutor:
+        came = f"{done} of {len(chunks)} chunks were here"
+        ended = f"a process of workers was ended from outside, as where memory runs out, when {came}"
+        raise RuntimeError(ended) from None
+
+
+def _elsewhere(task: Task, chunks: Sequence[Chunk], workers: Map | Executor) -> object:
+    """What others make: an executor or a pool, also by their maps, as chunks end; or another map."""
+    pool = workers if isinstance(workers, Executor) else getattr(workers, "__self__", None)
+    if isinstance(pool, Executor):
+        return _by_executor(pool, task, chunks)
+    if isinstance(pool, Pool):
+        return _by_pool(pool, task, chunks)
+    assert not isinstance(workers, Executor)
+    return workers(task, chunks)
+
+
+def _by_executor(pool: Executor, run: Callable[[Chunk], Part], chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
+    """The parts as they end, none of which is kept: an executor's own map waits for the first, and holds the others."""
+    waiting = {pool.submit(run, chunk) for chunk in chunks}
+    try:
+        while waiting:
+            ended, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
+            while ended:
+                yield ended.pop().result()
     finally:
         for each in waiting:
             each.cancel()
@@ -114,37 +115,3 @@ def _by_pool(pool: Pool, task: Task, chunks: Sequence[Chunk]) -> Generator[Part,
                 break
             if any([each.exitcode not in (None, 0) for each in watched]):
                 raise BrokenExecutor
-
-
-def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array) -> Generator[Part, None, None]:
-    stop, ended = threading.Event(), SimpleQueue[Future[Part]]()
-    futures: list[Future[Part]] = []
-    with ThreadPoolExecutor(threads) as pool:
-        try:  # threads run from the first submission on, and the pool waits for them at any exit
-            futures.extend(pool.submit(task.run, chunk, _rows(table, chunk), stop.is_set) for chunk in chunks)
-            for future in futures:
-                future.add_done_callback(ended.put)
-            for _ in futures:
-                yield _next(ended).result()
-        except KeyboardInterrupt:
-            stop.set()
-            running = [future for future in futures if not future.cancel()]
-            for future in running:
-                with suppress(StoppedError):
-                    yield future.result()
-            raise
-        except BaseException:  # an error in a thread, or nobody wants the rest
-            stop.set()
-            for future in futures:
-                future.cancel()
-            raise
-
-
-def _next(ended: SimpleQueue[Future[Part]]) -> Future[Part]:
-    while True:
-        with suppress(Empty):
-            return ended.get(timeout=LOOK)
-
-
-def _rows(table: Array, chunk: Chunk) -> Array:
-    return table[chunk.first : chunk.first + len(chunk.x)]

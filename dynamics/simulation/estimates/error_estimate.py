@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -18,7 +19,17 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..run_options import RunOptions
-from ..steps.equal_steps import EqualSteps, Numbers, halved, instants_of, longer, some_of
+from ..stepper import EqualStepper, Stepper
+from ..steps.dense_output import StepBlock
+from ..steps.equal_steps import (
+    SAME_INSTANT,
+    EqualSteps,
+    Numbers,
+    equal_steps,
+    instants_of,
+    longer_steps,
+    sampled_numbers,
+)
 from ..steps.state_sizes import Flags, off_by
 from ..steps.step_program import StepProgram
 from .unresolved import Watch
@@ -30,6 +41,7 @@ UNIT = 2.0**-52  # the last bit of a number near 1
 ASIDE = 1.0 + 8.0 * UNIT  # times each component, runs beside start: what roundings grow to is part of the error
 FOUR = 4  # steps, at whose ends those of all runs end
 LOOKS = 1024  # instants at which runs are compared, at most
+LATE, SHARE = 2.0, 0.1  # steps, or of the time between resets: runs parted for longer take other courses
 UNKNOWN = "the error is unknown"
 
 
@@ -65,49 +77,52 @@ class RunsBeside(NamedTuple):
 def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     """Runs of steps twice and four times as long; if there are too few of them, one of steps half as long."""
     steps, longest = sum([part.steps for part in stretches]), max([abs(part.h) for part in stretches])
-    numbers = some_of(steps, FOUR, LOOKS)
+    numbers = sampled_numbers(steps, FOUR, LOOKS)
     t = instants_of(stretches, numbers)
-    runs = [longer(t, numbers, times) for times in (2, 4)]
+    runs = [longer_steps(t, numbers, times) for times in (2, 4)]
     one, two, four = [
         sum([part.steps * (abs(part.h) / longest) ** (order + 1) for part in each])
         for each in (stretches, runs[0][0], runs[1][0])
     ]
     if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
         return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
-    numbers = some_of(steps, 1, LOOKS)
-    half = [(halved(stretches), 2 * numbers)]
-    return RunsBeside(law_of_halves(longest, order), half, numbers, instants_of(stretches, numbers))
+    half = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
+    numbers = sampled_numbers(steps, 1, LOOKS)
+    return RunsBeside(law_of_halves(longest, order), [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
+
+
+class Comparison(NamedTuple):
+    """States of k runs, and of those beside them, at instants t (T,).
+
+    rows: (k, T, m) each, not finite where a run has stopped.  alike: of each and the next, which rows can be compared;
+    all by default.  lost: when one takes another course.
+    """
+
+    t: Array
+    rows: Sequence[Array]
+    alike: Sequence[Flags] = ()
+    lost: float = math.nan
 
 
 def error_estimates(
-    program: StepProgram,
-    options: RunOptions,
-    law: Law,
-    watch: Watch,
-    steps: int,
-    t: Array,
-    rows: Sequence[Array],
-    alike: Sequence[Flags] = (),
-    lost: float = math.nan,
+    program: StepProgram, options: RunOptions, law: Law, watch: Watch, steps: int, compared: Comparison
 ) -> dict[str, Array]:
-    """Columns of the statistics of k runs of so many steps: "error", "error_at_end" and "warnings" of what is too large.
+    """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
     The errors are relative to the sizes of components, NaN if nothing was compared, and infinite if unknown.
-
-    t: instants (T,).  rows: states (k, T, m) of the runs and of those beside, not finite where one has stopped.
-    alike: of each run and the next, which rows can be compared; all by default.  lost: when one takes another course.
     """
+    t, rows, alike, lost = compared
+    many, warnings = len(rows[0]), np.zeros(len(rows[0]), dtype=np.object_)
+    warnings.fill(())
+    if len(rows) == 1:
+        return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
+    watch.look()
     between = [other - one for one, other in itertools.pairwise(rows)]
     for k, each in enumerate(between):
         np.abs(each, out=each)
         if alike:
             each[:, ~alike[k]] = 0.0
-    many, at_end = len(rows[0]), int(np.flatnonzero(alike[0])[-1]) if alike else -1
-    warnings: Array = np.zeros(many, dtype=np.object_)
-    warnings.fill(())
-    if not between:
-        return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
-    watch.look()
+    at_end = int(np.flatnonzero(alike[0])[-1]) if alike else -1
     scale = program.kinds.scale(np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)))
     peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in between]]
     since = np.full(many, lost)
@@ -151,3 +166,159 @@ def _errors(first: Array, measured: Array, law: Law, bent: Flags) -> Array:
     clipped = np.where(np.isfinite(measured), np.clip(measured, least, law.ratio), least)
     by_law = first * law.share * (law.ratio - 1.0) / (clipped - 1.0)
     return np.where((first <= LAWLESS) & ~bent[:, None], by_law, first)
+
+
+class RunEstimate:
+    """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them."""
+
+    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
+        self._run, self._x, self._options = run, x, options
+        self._compared: _Whole | _Periods | None = None
+        self.seconds = 0.0  # spent here
+
+    def add(self, block: StepBlock) -> None:
+        """The next steps of the run, or a reset."""
+        if not self._options.estimated or not len(block.t):
+            return
+        begin, run = time.perf_counter(), self._run
+        assert isinstance(run, EqualStepper)
+        if self._compared is None:
+            p, program = np.array([run.parameters]), run.program
+            self._watch = Watch(program.rate, program.order, p, self._options.t0, self._x[None])
+            if run.control is None:
+                self._compared = _Whole(run, self._x, self._options)
+            else:
+                self._compared = _Periods(run, self._x, self._options.t0, self._watch)
+        if block.h[0] == 0.0:
+            self._watch.restart(float(block.t[0]), block.x)
+        else:
+            self._compared.add(block)
+            self._watch.add(block.t, block.x[None])
+        self.seconds += time.perf_counter() - begin
+
+    def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
+        """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
+        if self._compared is None:
+            return None, None, ()
+        begin, program = time.perf_counter(), self._run.program
+        law, compared = self._compared.comparison(self._run.largest, program.order)
+        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, compared)
+        error, last, said = [column[0] for column in columns.values()]
+        self.seconds += time.perf_counter() - begin
+        return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
+
+
+class _Rows:
+    """States (T, m) of a run that starts with x, at instants t (T,), and how many resets it has had.
+
+    count: of the instants that it has come to; beyond the states are NaN.
+    """
+
+    def __init__(self, t: Array, x: Array) -> None:
+        self.t, self.x, self.resets, self.count = t, np.full((len(t), len(x)), math.nan), np.zeros(len(t)), 1
+        self.x[0], self._forth = x, np.sign(t[-1] - t[0])
+        self._times = self._forth * t - SAME_INSTANT * np.spacing(np.abs(t).max())  # for those at which steps end
+
+    def add(self, block: StepBlock, resets: int) -> None:
+        """The next steps, before which it had so many resets."""
+        ends = self._forth * block.t
+        here = slice(self.count, int(np.searchsorted(self._times, ends[-1], side="right")))
+        if block.dense is None:
+            self.x[here] = block.x[np.searchsorted(ends, self._times[here])]
+        else:
+            self.x[here] = block.at(self._forth * np.minimum(self._forth * self.t[here], ends[-1]))
+        self.resets[here], self.count = resets, max(self.count, here.stop)
+
+
+class _Whole:
+    """A run and runs beside it that go all the way, at instants at which steps of all end.
+
+    Runs with resets have these at other times, and are compared by their dense output where both have had as many.
+    """
+
+    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
+        self._run, self._x, stretches = run, x, equal_steps(options.instants, options.step)
+        self._resetting = run.log is not None and any([event.reset for event in run.log.program.events])
+        if self._resetting:
+            stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
+        self._beside = runs_beside(stretches, run.program.order)
+        self._rows = _Rows(self._beside.t, x)
+
+    def add(self, block: StepBlock) -> None:
+        """The next steps of the run."""
+        self._rows.add(block, self._run.resets)
+
+    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
+        """What the runs beside tell, after the last step."""
+        one, law = self._rows, self._beside.law
+        t = one.t[: one.count]
+        rows, alike = [one.x[None, : len(t)]], list[Flags]()
+        for stretches, _ in self._beside.runs if len(t) > 1 else ():
+            if self._resetting:
+                run = self._run.again(max([abs(part.h) for part in stretches]))
+            else:
+                run = self._run.beside(stretches, self._run.parameters)
+            other = _Rows(t, self._x)
+            for block in run.blocks(self._x * ASIDE):
+                if block.h[0] != 0.0:
+                    other.add(block, run.resets)
+                if other.count == len(t):
+                    break
+            if run.event:  # which has ended it before the other
+                other.resets[other.count :] = math.inf
+            rows.append(other.x[None])
+            alike.append(one.resets[: len(t)] == other.resets)
+            one = other
+        lost = _parting_time(t, alike[0], law.longest, self._run.resets) if alike else math.nan
+        return law, Comparison(t, rows, alike, lost)
+
+
+def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
+    """When runs with so many resets have other ones for longer than their steps explain; NaN if they have not."""
+    begins, ends = np.flatnonzero(np.diff(~alike, prepend=False, append=False)).reshape(-1, 2).T
+    late = max(LATE * longest, SHARE * abs(t[-1] - t[0]) / (1 + resets))
+    apart = np.flatnonzero((np.abs(t[ends - 1] - t[begins]) > late) | (2 * alike.sum() < len(t)))
+    return float(t[begins[apart[0]]]) if len(apart) else math.nan
+
+
+class _Periods:
+    """Differences of a run's stretches of steps under the same forces of a controller, each compared by itself.
+
+    These forces answer the states of the run, and would be others beside it: from where the run is, steps of half the
+    length are made under the same. The differences add up.
+    """
+
+    _stretch: EqualSteps  # of which so many steps are done
+
+    def __init__(self, run: EqualStepper, x: Array, t0: float, watch: Watch) -> None:
+        self._run = run
+        self._watch, self._t0, self._since, self._steps = watch, t0, math.inf, 0
+        self._size, self._sum = np.abs(x), np.zeros(len(x))
+
+    def add(self, block: StepBlock) -> None:
+        """The next steps of the run."""
+        if not self._steps or self._run.stretch is not self._stretch:
+            self._compare()
+            self._stretch, self._forces = self._run.stretch, self._run.parameters
+            self._start, self._steps = block.x_old[0], 0
+            self._watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
+        self._size = np.maximum(self._size, np.abs(block.x).max(axis=0))
+        self._steps, self._t, self._end = self._steps + len(block.t), float(block.t[-1]), block.x[-1]
+
+    def _compare(self) -> None:
+        """Add the difference of the stretch, as far as it went."""
+        if not self._steps:
+            return
+        begin, steps, end = self._stretch.begin, 2 * self._steps, self._start
+        run = self._run.beside([EqualSteps(begin, (self._t - begin) / steps, steps, self._t)], self._forces)
+        for block in run.blocks(self._start):
+            end = block.x[-1]
+        self._sum = self._sum + (math.nan if run.status else np.abs(end - self._end))
+        if not np.isfinite(self._sum).all():
+            self._since = min(self._since, self._t)
+
+    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
+        """What the differences tell, after the last step, as those of two rows."""
+        self._compare()
+        rows = [np.array([[self._size] * 2]), np.array([[self._size, self._size + self._sum]])]
+        return law_of_halves(longest, order), Comparison(np.array([self._t0, self._since]), rows)

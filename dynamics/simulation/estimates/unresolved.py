@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -15,35 +15,22 @@ from ...systems.arguments import TIME
 from ..steps.row_values import values_of
 
 PARTS, TIMES = 16, 10  # into which the way from one state to the next is divided, and again, to find a branch's change
-BURST = (
-    4  # steps, by which changes of branches are apart that are those of one passage, as where friction comes to rest
-)
+BURST = 4  # steps: changes of branches no farther apart are one passage, as where friction comes to rest
 TOGETHER = 512  # states that are looked at once
 WAVES = ("sin", "cos", "tan")
 
-
-class Branch(NamedTuple):
-    """Branch of an operation: a number that changes only across its jump or kink, and its value where that is given."""
-
-    of: Callable[..., Node]
-    given: Callable[..., Node]
-
-
-BRANCHES = {
-    **{
-        name: Branch(lambda node, *args: node, lambda branch, *args: branch)
-        for name in ("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal")
-    },
-    "minimum": Branch(lambda node, a, b: less(a, b), lambda branch, a, b: where(branch, a, b)),
-    "maximum": Branch(lambda node, a, b: less(a, b), lambda branch, a, b: where(branch, b, a)),
-    "abs": Branch(lambda node, a: less(a, 0.0), lambda branch, a: where(branch, -a, a)),
-    "fmod": Branch(lambda node, a, b: _whole(a / b), lambda branch, a, b: a - branch * b),
+# Of an operation its branch, a number that changes only across its jump or kink; and its value where that is given.
+Branch: TypeAlias = tuple[Callable[..., Node], Callable[..., Node]]
+BRANCHES: dict[str, Branch] = {
+    **dict.fromkeys(
+        ("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal"),
+        (lambda node, *args: node, lambda branch, *args: branch),
+    ),
+    "minimum": (lambda node, a, b: less(a, b), lambda branch, a, b: where(branch, a, b)),
+    "maximum": (lambda node, a, b: less(a, b), lambda branch, a, b: where(branch, b, a)),
+    "abs": (lambda node, a: less(a, 0.0), lambda branch, a: where(branch, -a, a)),
+    "fmod": (lambda node, a, b: where(less(a / b, 0.0), -floor(-(a / b)), floor(a / b)), lambda n, a, b: a - n * b),
 }
-
-
-def _whole(ratio: Node) -> Node:
-    """The whole number next to it towards 0."""
-    return where(less(ratio, 0.0), -floor(-ratio), floor(ratio))
 
 
 class Unresolved(NamedTuple):
@@ -66,46 +53,39 @@ def unresolved(rate: Graph) -> Unresolved:
         if not timed.isdisjoint(node.args):
             timed.add(node)
     waves = dict.fromkeys(node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed)
-    bent = [node for node in rate.nodes if node.op.name in BRANCHES]
     phases = Graph(rate.inputs, {f"phase{k}": node for k, node in enumerate(waves)}) if waves else None
+    word = "branch" + "_" * max(map(len, rate.input_names))  # the name of no input begins so
+    bent = [node for node in rate.nodes if node.op.name in BRANCHES]
     if not bent:
         return Unresolved(phases, None, None)
-    word = "branch" + "_" * max(map(len, rate.input_names))  # the name of no input begins so
-    branches = {f"{word}{k}": BRANCHES[node.op.name].of(node, *node.args) for k, node in enumerate(bent)}
-    return Unresolved(phases, Graph(rate.inputs, branches), _sides(rate, dict(zip(bent, branches, strict=True))))
-
-
-def _sides(rate: Graph, names: dict[Node, str]) -> Graph:
-    """The rate where what these nodes branch on is given, by inputs of these names."""
-    given = {node: variable(name) for node, name in names.items()}
+    given = {node: variable(f"{word}{k}") for k, node in enumerate(bent)}
+    branches = {f"{word}{k}": BRANCHES[node.op.name][0](node, *node.args) for k, node in enumerate(bent)}
     build, new = Builder(), {node: node for node in rate.inputs}
     with building(build):
         for node in rate.nodes:
             args = tuple([new[arg] for arg in node.args])
             if node in given:
-                new[node] = BRANCHES[node.op.name].given(given[node], *args)
+                new[node] = BRANCHES[node.op.name][1](given[node], *args)
             elif node not in new:
                 new[node] = build(node.op, args, node.label) if args else node
-    return Graph([*rate.inputs, *given.values()], {name: new[node] for name, node in rate.outputs.items()})
-
-
-def is_watched(rate: Graph) -> bool:
-    """Whether a rate has parts that steps may not resolve."""
-    return any(graph is not None for graph in unresolved(rate))
+    sides = Graph([*rate.inputs, *given.values()], {name: new[node] for name, node in rate.outputs.items()})
+    return Unresolved(phases, Graph(rate.inputs, branches), sides)
 
 
 class Watch:
     """What steps of k runs side by side cannot resolve, as the states after all of them come.
 
-    p: values of the parameters, (k, ..).  turning: of sines and cosines [rad/s], (k,).  bent: whether a jump or a kink
-    was passed, (k,).  missed: by how much steps across these are off, added up, (k, m).
+    p: values of the parameters, (k, ..).  needed: whether a rate has such parts.  turning: of sines and cosines
+    [rad/s], (k,).  bent: whether a jump or a kink was passed, (k,).  missed: by how much steps across these are off,
+    added up, (k, m).
     """
 
     def __init__(self, rate: Graph, order: int, p: Array, t: float, x: Array) -> None:
         """The runs start from x (k, m) at t."""
-        self._what, self._order, self._p, self.needed = unresolved(rate), order, p, is_watched(rate)
+        self._what, self._order = unresolved(rate), order
+        self.needed = self._what.waves is not None or self._what.branches is not None
         self.turning, self.bent, self.missed = np.zeros(len(x)), np.zeros(len(x), dtype=bool), np.zeros(x.shape)
-        self._seen = [(np.array([t]), x[:, None])]
+        self._p, self._seen = p, [(np.array([t]), x[:, None])]
 
     def add(self, t: Array, x: Array) -> None:
         """The next states, (k, r, m), at times t (r,)."""
@@ -126,13 +106,12 @@ class Watch:
         t, x = np.concatenate([t for t, _ in self._seen]), np.concatenate([x for _, x in self._seen], axis=1)
         self._seen = [(t[-1:], x[:, -1:])]
         if self._what.waves is not None:
-            phases = _values(self._what.waves, t, x, self._p[:, None])
-            speeds = np.abs(np.diff(phases)) / np.abs(np.diff(t))
+            speeds = np.abs(np.diff(_values(self._what.waves, t, x, self._p[:, None]))) / np.abs(np.diff(t))
             self.turning = np.maximum(self.turning, speeds.max(axis=(0, 2)))
-        if self._what.branches is not None:
-            self._look_for_branches(self._what.branches, t, x)
+        if self._what.branches is not None and self._what.sides is not None:
+            self._look_across(self._what.branches, self._what.sides, t, x)
 
-    def _look_for_branches(self, branches: Graph, t: Array, x: Array) -> None:
+    def _look_across(self, branches: Graph, sides: Graph, t: Array, x: Array) -> None:
         """Note the steps across jumps and kinks.
 
         A step across a jump may be off by the jump times the way from there to the nearer end of the step; of order 1,
@@ -140,42 +119,35 @@ class Watch:
         evaluates the rate on both sides, and steps of other lengths differ. Across a kink the two sides differ by what
         the rate has become since: least at the nearer end, too.
         """
-        assert self._what.sides is not None
         branch = _values(branches, t, x, self._p[:, None])
         run, row = np.nonzero((branch[:, :, 1:] != branch[:, :, :-1]).any(axis=0))
         if not len(run):
             return
         self.bent[run], p = True, self._p[run]
-        ends = [_End(t[at], x[run, at], branch[:, run, at]) for at in (row, row + 1)]
-        rates = [[_values(self._what.sides, end.t, end.x, p, each.branch) for each in ends] for end in ends]
+        ends = np.stack([row, row + 1])
+        t, x, branch = t[ends], x[run, ends], np.moveaxis(branch[:, run, ends], 1, 0)
+        rates = [[_values(sides, t[k], x[k], p, one) for one in branch] for k in (0, 1)]
         apart = np.fmin(*[np.abs(here - there).T for here, there in rates])
-        way = np.ones(len(run)) if self._order == 1 else np.minimum(_way(branches, *ends, p), 1.0 / self._order)
-        off = apart * (np.abs(ends[1].t - ends[0].t) * way)[:, None]
+        way = 1.0 if self._order == 1 else np.minimum(_way(branches, t, x, branch, p), 1.0 / self._order)
+        off = apart * (np.abs(t[1] - t[0]) * way)[:, None]
         first = np.flatnonzero(np.diff(run, prepend=-1) + (np.diff(row, prepend=row[0]) > BURST))
         largest = np.maximum.reduceat(np.where(np.isfinite(off), off, 0.0), first)
         np.add.at(self.missed, run[first], largest)
 
 
-class _End(NamedTuple):
-    """Ends of steps: times (n,), states (n, m) and branches (.., n)."""
+def _way(branches: Graph, t: Array, x: Array, branch: Array, p: Array) -> Array:
+    """Distances, (n,), of the first and last change of a branch in the steps from the nearer end, at most.
 
-    t: Array
-    x: Array
-    branch: Array
-
-
-def _way(branches: Graph, begin: _End, end: _End, p: Array) -> Array:
-    """Distances, (n,), of the first and last change of a branch in the steps from the nearer end, at most."""
-    low, length = np.array([[0.0], [1.0]]), np.array([[1.0], [-1.0]])  # from both ends
-    sides = np.stack([begin.branch, end.branch], axis=1)[..., None]
+    t (2, n), x (2, n, m), branch (2, .., n): at the ends.
+    """
+    low, length = np.broadcast_to([[0.0], [1.0]], t.shape), np.array([[1.0], [-1.0]])  # from both ends
     parts = np.arange(1.0, PARTS + 1.0) / PARTS
-    low = np.broadcast_to(low, (2, len(p)))
     for _ in range(TIMES):
         shares = low[..., None] + length[..., None] * parts
-        x = begin.x[:, None] + shares[..., None] * (end.x - begin.x)[:, None]
-        t = begin.t[:, None] + shares * (end.t - begin.t)[:, None]
-        other = (_values(branches, t, x, p[:, None]) != sides).any(axis=0)
-        low = low + length * (np.where(other.any(axis=2), other.argmax(axis=2), PARTS - 1) / PARTS)
+        inside = x[0][:, None] + shares[..., None] * (x[1] - x[0])[:, None]
+        times = t[0][:, None] + shares * (t[1] - t[0])[:, None]
+        changed = (_values(branches, times, inside, p[:, None]) != np.moveaxis(branch, 0, 1)[..., None]).any(axis=0)
+        low = low + length * (np.where(changed.any(axis=2), changed.argmax(axis=2), PARTS - 1) / PARTS)
         length = length / PARTS
     return np.asarray(np.minimum(low, 1.0 - low).clip(0.0).max(axis=0))
 

@@ -24,8 +24,8 @@ DECAY = 16.0  # of what a cubic misses, from a cell to its halves
 MARGIN = 12.0  # by which a cubic has to tell more than it misses
 PARTS, AT_ONCE = 32, 8192  # into which a cell is divided again and again, and those of all cells together
 WHILE = 2.0**-20  # of a step
+SMALL = 2.0**-10  # of what a quantity is in a cell: an end that is less may be zero to rounding
 BITS = 56.0  # of where in a cell
-PROBES = 0.5 ** np.arange(50, 0, -5)  # of a cell: how far from a zero the sign beside it is asked for
 
 
 class Crossing(NamedTuple):
@@ -43,20 +43,17 @@ class Side:
     """Side of zero on which a quantity is, between one part of a run and the next.
 
     sign: its last, 0 before it has one; of one at rest on zero, that of the side that it belongs to, if there is one.
-    slope: at the end of the last step; NaN at a start.  left: of a run that starts on zero, the sign with which the
-    quantity leaves, 0 as long as it rests there; NaN elsewhere.
+    slope: at the end of the last step; NaN at a start.
+    leaving: whether it starts on zero and moves to this side.  resting: whether it has been zero, to rounding, since
+    the start of the run or the last reset.
     waiting: whether it is zero at the last instant, and what it does there is for the next step to tell.
     """
 
     sign: float = 0.0
     slope: float = math.nan
-    left: float = math.nan
+    leaving: bool = False
+    resting: bool = False
     waiting: bool = False
-
-    @property
-    def resting(self) -> bool:
-        """Whether the quantity has been zero, to rounding, since the start of the run or the last reset."""
-        return self.left == 0.0
 
 
 class WatchedSteps(NamedTuple):
@@ -212,132 +209,92 @@ def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
     if not math.isnan(side.slope):
         cells.slope_a[0] = side.slope
     side.slope = float(cells.slope_b[-1])
-    return _Looks(steps, *_at_extrema(steps, cells), side).crossings(side), beyond
+    cells, extrema = _at_extrema(steps, cells)
+    rows, s = np.concatenate([cells.rows[:1], cells.rows]), np.concatenate([cells.a[:1], cells.b])  # of looks
+    g = np.concatenate([cells.g_a[:1], cells.g_b])
+    # the sign before the first look, and those at looks; 0 of a quantity at zero
+    signs = np.nan_to_num(np.sign(np.append(side.sign, g)))
+    zero = g == 0.0
+    zero[0] |= side.leaving or side.resting
+    beside = np.concatenate([np.flatnonzero(signs[:-1] * signs[1:] < 0.0), extrema])
+    _add_rounded_zeros(zero, beside, lambda looks: np.abs(g[looks]) <= steps.rounding(rows[looks], s[looks]))
+    signs[1:][zero] = 0.0
+    if side.leaving:
+        signs[1], side.leaving = side.sign, False
+    found, arrivals = list[Crossing](), list[int]()
+
+    def stays(begin: int, end: int) -> bool:
+        """Whether the quantity is exactly zero for a while, not only at looks that lie side by side at a touch."""
+        zeros = begin + np.flatnonzero(g[begin:end] == 0.0)
+        place = rows[zeros] + s[zeros]
+        return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
+
+    known = np.flatnonzero(signs)
+    known = known[known > 0] if side.resting else known
+    if not len(known):
+        return [], beyond
+    if side.resting:
+        side.resting, look = False, max(int(known[0]) - 2, 0)
+        if side.sign != signs[known[0]]:
+            found.append(Crossing(int(rows[look]), float(s[look]), side.sign, touching=False, resting=True))
+    here, there, last = known[:-1], known[1:], int(known[-1])
+    turns = np.flatnonzero((signs[here] != signs[there]) | (there > here + 1))
+    for i, j in zip(here[turns].tolist(), there[turns].tolist(), strict=True):
+        if signs[i] != signs[j] or stays(i, j - 1):
+            arrivals.append(i)
+        else:
+            between = [look for look in extrema.tolist() if i <= look < j - 1]
+            look = between[0] if between else (i + j - 2) // 2
+            found.append(Crossing(int(rows[look]), float(s[look]), float(signs[i]), touching=True))
+    side.sign = float(signs[last])
+    if stays(last, len(g)):
+        arrivals.append(last)
+        side.sign = 0.0
+    side.waiting = bool(zero[-1]) and side.sign != 0.0
+    # an arrival is at the next look, if that is zero or the first, or within the cell before it
+    looks = np.array(arrivals, dtype=np.intp)
+    inside = (looks > 0) & ~zero[np.minimum(looks, len(g) - 1)]
+    places, few, sign = s[looks], cells.take(looks[inside] - 1), signs[looks]
+    places[inside] = _turn(lambda s: steps.values(few.rows, s) * sign[inside, None] > 0.0, few.a, few.b)[1]
+    at = zip(rows[looks].tolist(), places.tolist(), sign.tolist(), strict=True)
+    return [*found, *[Crossing(row, share, side, touching=False) for row, share, side in at]], beyond
 
 
 def _at_extrema(steps: WatchedSteps, cells: Cells) -> tuple[Cells, Indices]:
     """The cells, parted at extrema where a quantity may come to zero and turn back; and the looks there."""
-    sign = np.sign(cells.g_a)
-    dips = (sign * np.sign(cells.g_b) > 0.0) & (cells.slope_a * sign < 0.0) & (cells.slope_b * sign >= 0.0)
-    dips[dips] = ~cells.take(dips).clear()
-    few, sign = cells.take(dips), sign[dips]
-    if not len(sign):
+    turns = (cells.slope_a != 0.0) & (cells.slope_a * cells.slope_b <= 0.0)
+    few = cells.take(turns)
+    ends, points = np.stack([few.g_a, few.g_b]), few.control_points()
+    toward = (ends * np.sign(few.slope_a) < 0.0).all(axis=0)
+    at_zero = np.abs(ends).min(axis=0) <= SMALL * np.abs(points).max(axis=0)
+    turns[turns] = (toward | at_zero) & ~few.clear()
+    few = cells.take(turns)
+    if not len(few.a):
         return cells, np.zeros(0, dtype=np.intp)
+    sign = -np.sign(few.slope_a)
     pair = _turn(lambda s: steps.slopes(few.rows, s) * sign[:, None] < 0.0, few.a, few.b)
     at, g = np.stack(pair), np.stack([steps.values(few.rows, s) for s in pair])
     nearest = np.argmin(g * sign, axis=0)[None]
     s, value = (np.take_along_axis(table, nearest, axis=0)[0] for table in (at, g))
-    parted = cells.replaced(dips, few._replace(b=s, g_b=value), few._replace(a=s, g_a=value))
-    return parted, np.flatnonzero(dips) + np.arange(1, len(s) + 1)
+    parted = cells.replaced(turns, few._replace(b=s, g_b=value), few._replace(a=s, g_a=value))
+    return parted, np.flatnonzero(turns) + np.arange(1, len(s) + 1)
 
 
-class _Looks:
-    """The quantity along the cells: looks 0 .. k at their ends, and the signs beside them."""
+def _add_rounded_zeros(zero: Flags, beside: Indices, rounded: Callable[[Indices], Flags]) -> None:
+    """Flag looks that are zero to rounding near an extremum, a change of sign, or another look at zero.
 
-    def __init__(self, steps: WatchedSteps, cells: Cells, extrema: Indices, side: Side) -> None:
-        self.steps, self.cells = steps, cells
-        self.rows = np.concatenate([cells.rows[:1], cells.rows])
-        self.shares = np.concatenate([cells.a[:1], cells.b])
-        g = np.concatenate([cells.g_a[:1], cells.g_b])
-        self.exact = g == 0.0
-        signs = np.nan_to_num(np.sign(g))
-        beside = np.flatnonzero(np.concatenate([[side.sign], signs[:-1]]) * signs < 0.0)
-        self.zero = self._zeros(g, np.concatenate([beside, extrema]), start=not math.isnan(side.left))
-        looks = np.flatnonzero(self.zero)
-        before, after = signs.copy(), signs.copy()
-        before[looks], after[looks] = self._beside(looks, -1), self._beside(looks, 1)
-        if side.left and not math.isnan(side.left):
-            after[0], side.left = side.left, math.nan
-        # [sign before look 0, start of cell 0, its end, start of cell 1, ..]: even entries stand before their look
-        self.signs = np.empty(2 * len(cells.a) + 1)
-        self.signs[0] = side.sign
-        self.signs[1::2], self.signs[2::2] = after[:-1], before[1:]
-
-    def _zeros(self, g: Array, beside: Indices, *, start: bool) -> Flags:
-        """Flags of the looks at zero: exactly, or to rounding near an extremum, a change of sign or such a look.
-
-        beside: looks at extrema, and those before which the sign changes.  start: whether the first look is at zero.
-        """
-        zero: Flags = g == 0.0
-        zero[0] |= start
-        tested, near = np.zeros(len(g), dtype=bool), np.flatnonzero(zero)
-        while True:
-            looks = np.unique(np.concatenate([near - 1, near, near + 1, beside - 1, beside]))
-            looks = looks[(looks >= 0) & (looks < len(g))]
-            looks, beside = looks[~tested[looks]], beside[:0]
-            if not len(looks):
-                return zero
-            tested[looks] = True
-            near = looks[np.abs(g[looks]) <= self.steps.rounding(self.rows[looks], self.shares[looks])]
-            zero[near] = True
-
-    def _beside(self, looks: Indices, direction: int) -> Array:
-        """The signs of the quantity just before or after looks at which it is zero; 0 where it stays zero."""
-        cells = self.cells
+    beside: looks at extrema, and those before which the sign changes.
+    """
+    tested, near = np.zeros(len(zero), dtype=bool), np.flatnonzero(zero)
+    while True:
+        looks = np.unique(np.concatenate([near - 1, near, near + 1, beside - 1, beside]))
+        looks = looks[(looks >= 0) & (looks < len(zero))]
+        looks, beside = looks[~tested[looks]], beside[:0]
         if not len(looks):
-            return np.zeros(0)
-        cell = np.clip(looks - (direction < 0), 0, len(cells.a) - 1)
-        start, end = (cells.a[cell, None], cells.b[cell, None])[::direction]
-        s = np.clip(start + (end - start) * PROBES, 0.0, 1.0)
-        g = self.steps.values(cells.rows[cell], s)
-        sure = np.abs(g) > self.steps.rounding(cells.rows[cell], s)
-        nearest = np.take_along_axis(g, np.argmax(sure, axis=1)[:, None], axis=1)[:, 0]
-        outside = looks == (0 if direction < 0 else len(cells.a))
-        beside: Array = np.where(sure.any(axis=1) & ~outside, np.sign(nearest), 0.0)
-        return beside
-
-    def crossings(self, side: Side) -> list[Crossing]:
-        """Where signs turn, and where a quantity that was zero at a look goes back; `side` moves on."""
-        signs, found, arrivals = self.signs, list[Crossing](), list[int]()
-        known = np.flatnonzero(signs)
-        known = known[known > 0] if side.resting else known
-        if not len(known):
-            return []
-        if side.resting:
-            side.left, look = math.nan, (int(known[0]) - 1) // 2
-            if side.sign != signs[known[0]]:
-                found.append(Crossing(int(self.rows[look]), float(self.shares[look]), side.sign, False, resting=True))
-        i, j, last = known[:-1], known[1:], int(known[-1])
-        at_zero = (i % 2 == 0) & self.zero[i // 2]
-        for k in np.flatnonzero((signs[i] != signs[j]) | (j > i + 1) | at_zero).tolist():
-            start, end = int(i[k]), int(j[k])
-            if signs[start] != signs[end] or self._stays(slice((start + 1) // 2, (end + 1) // 2)):
-                arrivals.append(start)
-            else:
-                found.append(self._touch(start, end))
-        side.sign = float(signs[last])
-        if self._stays(slice((last + 1) // 2, None)):
-            arrivals.append(last)
-            side.sign = 0.0
-        side.waiting = bool(self.zero[-1]) and side.sign != 0.0
-        return found + self._arrivals(np.array(arrivals, dtype=np.intp))
-
-    def _stays(self, looks: slice) -> bool:
-        """Whether the quantity is exactly zero for a while, not only at looks that lie side by side at a touch."""
-        zeros = np.flatnonzero(self.exact[looks]) + looks.start
-        place = self.rows[zeros] + self.shares[zeros]
-        return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
-
-    def _touch(self, start: int, end: int) -> Crossing:
-        """Touch where the slope turns between two entries, or, where no turn is seen, at a look between them."""
-        sign, first, last = float(self.signs[start]), start // 2, end // 2
-        look = (first + last + start % 2) // 2
-        row, s = self.rows[[look]], self.shares[[look]]
-        if start % 2 and self.rows[first + 1] == self.rows[last]:
-            low, high = self.cells.a[[first]], self.shares[[last]]
-            toward = self.steps.slopes(row, np.stack([low, high], axis=1))[0] * sign < 0.0
-            if toward[0] and not toward[1]:
-                s = _turn(lambda s: self.steps.slopes(row, s) * sign < 0.0, low, high)[0]
-        return Crossing(int(row[0]), float(s[0]), sign, touching=True)
-
-    def _arrivals(self, entries: Indices) -> list[Crossing]:
-        """First instants, to the last bit, at which the quantity has not the sign that it has at these entries."""
-        signs, looks, inside = self.signs[entries], entries // 2, entries % 2 == 1
-        rows, s, cells = self.rows[looks], self.shares[looks], self.cells.take(looks[inside])
-        rows[inside] = cells.rows
-        s[inside] = _turn(lambda s: self.steps.values(cells.rows, s) * signs[inside, None] > 0.0, cells.a, cells.b)[1]
-        places = zip(rows.tolist(), s.tolist(), signs.tolist(), strict=True)
-        return [Crossing(row, share, sign, touching=False) for row, share, sign in places]
+            return
+        tested[looks] = True
+        near = looks[rounded(looks)]
+        zero[near] = True
 
 
 def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:

@@ -162,11 +162,6 @@ class EventProgram:
         """The derivatives of the states by the time, (k, m), at times (k,) and states (k, m)."""
         return values_of(self.rate, [*x.T, t, *p], len(t)).T
 
-    def reset(self, number: int, t: float, x: Array, p: Sequence[float]) -> Array:
-        """The state (m,) after an event; the same where it resets nothing."""
-        graph = self.events[number].reset
-        return x if graph is None else values_of(graph, [*x, t, *p], 1)[:, 0]
-
 
 def event_program(problem: Problem, events: Sequence[Event]) -> EventProgram:
     """The graphs of these events of a problem. Raises TypeError or ValueError for what is no node of the state."""

@@ -48,7 +48,7 @@ class EventLog:
     ended: the event that has ended the run, in words.  status: why a reset has stopped it.
     parameters: of the rate, those of the block that is to come.
     restart: (t, x, x_new), the state that was reset and the one to go on from, else None.
-    warnings: a sentence for each event of which some may have been missed.
+    said: {(number of an event, what): sentence}, once each.
     """
 
     def __init__(self, program: EventProgram) -> None:
@@ -56,14 +56,13 @@ class EventLog:
         self.parameters: Sequence[float] = ()
         self.ended = self.status = ""
         self.restart: tuple[float, Array, Array] | None = None
-        self.warnings: list[str] = []
+        self.said: dict[tuple[int, str], str] = {}
         self.happened: list[Happening] = []
         self._sides: list[Side] = []  # none before the first step
         self._from = np.array([-float(event.direction) for event in program.events])  # sides, see `Crossing`
         self._steps = 0
-        self._sizes, self._ways = np.zeros((2, 2, len(program.components)))  # of states and rates: largest, and path
+        self._gone = np.zeros((2, len(program.components)))  # how far states and their rates, at least their sizes
         self._done: set[int] = set()  # events that happen again only after they have not been due
-        self._missed: set[int] = set()
         self._reset_at, self._restarts = math.nan, 0  # the instant, and how many in a row from which nothing got away
         self._last: StepBlock | None = None
 
@@ -71,10 +70,14 @@ class EventLog:
         """Note the events of these steps. The steps up to the event after which the run ends or restarts, or all."""
         for first in range(0, len(block.t), STEPS):
             part = block.part(slice(first, first + STEPS))
-            for (row, share), group in itertools.groupby(self._found(part), lambda one: one[:2]):
-                at, s = np.array([row]), np.array([share])
-                t, x = float(part.times_at(at, s)[0]), part.states_at(at, s)[0]
-                if self._happen(part.part(slice(row + 1)), t, x, {number: one for _, _, number, one in group}):
+            found = self._found(part)
+            rows, s = np.array([one[0] for one in found], dtype=np.intp), np.array([one[1] for one in found])
+            instants = zip(found, part.times_at(rows, s).tolist(), part.states_at(rows, s), strict=True)
+            for (row, share), group in itertools.groupby(instants, lambda one: one[0][:2]):
+                together = list(group)
+                _, t, x = together[0]
+                arrived = {number: one for (_, _, number, one), _, _ in together}
+                if self._happen(part.part(slice(row + 1)), t, x, arrived):
                     return block.part(slice(first + row + (share > 0.0))).ending(t, x)
             self._see(part, len(part.t), part.x[-1])
             self._last = part.part(slice(-1, None))
@@ -107,9 +110,8 @@ class EventLog:
             noise = self._noise(number, float(part.t[-1]), part.x[-1]) if side.resting else 0.0
             some, beyond = crossings(WatchedSteps(events[number], self.parameters, part, noise), side)
             found += [(one.row, one.s, number, one) for one in some]
-            if beyond.any() and number not in self._missed:
-                self._missed.add(number)
-                self._warn(number, MISSED.format(part.t_old[np.argmax(beyond)]))
+            if beyond.any():
+                self._say(number, MISSED, part.t_old[np.argmax(beyond)])
         return sorted(found)
 
     def _see(self, part: StepBlock, steps: int, x: Array) -> None:
@@ -119,19 +121,16 @@ class EventLog:
         times = np.append(part.t_old[:steps], part.t_old[0] if steps == 0 else part.t[steps - 1])
         for k, values in enumerate((states, self.program.rates(times, states, self.parameters))):
             values = np.where(np.isfinite(values), values, 0.0)
-            np.fmax(self._sizes[k], np.abs(values).max(axis=0), out=self._sizes[k])
-            self._ways[k] += np.abs(np.diff(values, axis=0)).sum(axis=0)
+            self._gone[k] += np.abs(np.diff(values, axis=0)).sum(axis=0)
+            np.fmax(self._gone[k], np.abs(values).max(axis=0), out=self._gone[k])
 
     def _happen(self, part: StepBlock, t: float, x: Array, arrived: Mapping[int, Crossing]) -> bool:
-        """Note what reaches zero at an instant of the last of these steps; whether that ends or resets the run.
-
-        One rule: what is due and has no reset happens, then the first reset that is due, and it is looked again. Due is
-        what is zero and moves to the other side than it has come from; what touches, once. One that ends the run does
-        so before any reset.
-        """
-        events, step, before = self.program.events, part.part(slice(-1, None)), None
+        """Note what reaches zero at an instant of the last of these steps; whether that ends or resets the run."""
+        events = self.program.events
         due = {n for n, one in arrived.items() if one.side and events[n].counts(one.side, touching=one.touching)}
-        if any(events[n].reset for n in due) and not any(events[n].terminal for n in due):
+        resets = any([events[n].reset for n in due]) and not any([events[n].terminal for n in due])
+        step = part.part(slice(-1, None))
+        if resets:
             self._see(part, len(part.t), x)
             before = self._look(step.t_old[0], step.x_old[0], step)
             # another reset may move what only the next step would find at zero
@@ -140,14 +139,24 @@ class EventLog:
             if one.side:
                 self._from[number] = one.side
             elif events[number].reset is not None:
-                self._warn(number, UNSIDED.format(t))
-        if before is None:
+                self._say(number, UNSIDED, t)
+        if resets:
+            self._reset(step, t, x, {n: arrived[n] for n in due}, before.zero)
+        else:
             self._note(due, t, x)
-            return bool(self.ended)
-        start, new, resets, look = x, sorted(due), list[int](), self._look(t, x, step)
-        touching = {n for n in due if arrived[n].touching}
-        returns = np.flatnonzero(before.zero & look.zero & (look.motions * self._from > 0.0)).tolist()
-        due = touching | due.difference(returns)  # what was at zero, and returns to its side, has not really left
+        return resets or bool(self.ended)
+
+    def _reset(self, step: StepBlock, t: float, x: Array, new: Mapping[int, Crossing], rested: Flags) -> None:
+        """Reset the state at an instant of a step.
+
+        One rule: what is due and has no reset happens, then the first reset that is due, and it is looked again. Due is
+        what is zero and moves to the other side than it has come from; what touches, once. One that ends the run does
+        so before any reset.  rested: what was at zero at the start of the step.
+        """
+        events, start, resets, look = self.program.events, x, list[int](), self._look(t, x, step)
+        touching = {number for number, one in new.items() if one.touching}
+        returns = np.flatnonzero(rested & look.zero & (look.motions * self._from > 0.0)).tolist()
+        due = touching | {*new}.difference(returns)  # what was at zero, and returns to its side, has not really left
         while len(resets) <= RESETS and np.isfinite(x).all():
             side = np.where(self._from == 0.0, -np.sign(look.motions), self._from)
             away = np.flatnonzero(look.zero & (look.motions * side < 0.0)).tolist()
@@ -166,13 +175,12 @@ class EventLog:
                 resets += first
                 x = values_of(graph, [*x, t, *self.parameters], 1)[:, 0]
                 look = self._look(t, x, step)
-        again = all([arrived[n].resting for n in new]) or abs(t - self._reset_at) <= RESOLUTION * abs(t)
+        again = all([one.resting for one in new.values()]) or abs(t - self._reset_at) <= RESOLUTION * abs(t)
         self._restarts = self._restarts + 1 if again else 0
         self._reset_at, self.restart = t, (t, start, x)
-        self.status = self._failure(t, x, resets or new)
+        self.status = self._failure(t, x, resets, new)
         self._from = np.where(look.zero & (look.motions != 0.0), np.sign(look.motions), self._from)
         self._sides = _sides(look, self._from)
-        return True
 
     def _note(self, numbers: Collection[int], t: float, x: Array) -> None:
         """These events happen at an instant and a state, which may end the run."""
@@ -182,20 +190,18 @@ class EventLog:
             if self.program.events[number].terminal and not self.ended:
                 self.ended = f"event {self.program.events[number].name!r} at t = {t:.6g} s"
 
-    def _failure(self, t: float, x: Array, resets: Sequence[int]) -> str:
-        """Reason why resets, the last of which made x, stop the run; empty if they do not."""
-        names = [f"{self.program.events[number].name!r}" for number in resets]
+    def _failure(self, t: float, x: Array, resets: Sequence[int], new: Collection[int]) -> str:
+        """Reason why resets by new events, the last of which made x, stop the run; empty if they do not."""
+        events, stopped = self.program.events, f"stopped at t = {t:.6g} s:"
         if len(bad := np.flatnonzero(~np.isfinite(x))):
-            component = self.program.components[bad[0]]
-            return f"stopped at t = {t:.6g} s: {component} is {x[bad[0]]} after the reset of event {names[-1]}"
+            after = f" after the reset of event {events[resets[-1]].name!r}" if resets else ""
+            return f"{stopped} {self.program.components[bad[0]]} is {x[bad[0]]}{after}"
         if len(resets) <= RESETS and self._restarts <= AT_ONCE:
             return ""
-        names = [f"{self.program.events[number].name!r}" for number in sorted({*resets[-AT_ONCE:]})]
+        names = [f"{events[number].name!r}" for number in sorted({*(resets[-AT_ONCE:] or new)})]
         which = f"event {names[0]} resets" if len(names) == 1 else f"events {', '.join(names)} reset"
-        return (
-            f"stopped at t = {t:.6g} s: {which} the state again and again at this instant; "
-            "a contact that stays needs other equations from here on"
-        )
+        what = f"{which} the state again and again at this instant"
+        return f"{stopped} {what}; a contact that stays needs other equations from here on"
 
     def _look(self, t: float, x: Array, step: StepBlock | None = None) -> _Look:
         """The quantities at an instant of a step, also after resets there; or at a start."""
@@ -221,24 +227,19 @@ class EventLog:
         """
         return UNIT * ROUNDED * math.sqrt(1.0 + self._steps)
 
-    @property
-    def _gone(self) -> Array:
-        """Distances that states and their rates have gone, (2, m), at least their sizes."""
-        return np.fmax(self._sizes, self._ways)
-
     def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:
         """Error of a quantity by the rounding of states, also inside a step to an end (1, m)."""
         errors = self._roundings * self._gone[:1] + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
         return float(self.program.events[number].error(np.array([t]), x[None], self.parameters, *errors)[0])
 
-    def _warn(self, number: int, what: str) -> None:
-        self.warnings.append(f"event {self.program.events[number].name!r} {what}")
+    def _say(self, number: int, what: str, t: float) -> None:
+        self.said.setdefault((number, what), f"event {self.program.events[number].name!r} {what.format(t)}")
 
 
 def _sides(look: _Look, own: Sequence[float] | Array) -> list[Side]:
     """Sides of quantities: of one at zero that to which it moves, or rest on its own side."""
     signs = zip(look.zero, np.sign(look.values).tolist(), np.sign(look.motions).tolist(), own, strict=True)
     return [
-        Side(value) if not zero else Side(left=motion) if motion else Side(float(side), left=0.0)
+        Side(value) if not zero else Side(motion, leaving=True) if motion else Side(float(side), resting=True)
         for zero, value, motion, side in signs
     ]

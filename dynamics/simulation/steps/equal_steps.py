@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,12 +43,15 @@ def _divided(begin: float, end: float, count: int) -> EqualSteps:
     return EqualSteps(begin, (end - begin) / count, count, end)
 
 
-def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
-    """Equal steps as of `equal_steps`, with instants that are evenly spaced, to rounding, in one stretch."""
+def even_steps(instants: Sequence[float], dt: float) -> tuple[list[EqualSteps], Numbers]:
+    """Equal steps as of `equal_steps`, with instants that are evenly spaced, to rounding, in one stretch.
+
+    With them, how many are done at the instants.
+    """
     times = np.array(instants)
     gaps, ulps = np.diff(times), np.spacing(np.maximum(np.abs(times[:-1]), np.abs(times[1:])))
     breaks = np.flatnonzero(np.abs(np.diff(gaps)) > EVEN * ulps[1:]) + 1
-    result: list[EqualSteps] = []
+    result, counts = list[EqualSteps](), [0]
     for first, last in itertools.pairwise([0, *breaks.tolist(), len(gaps)]):
         begin, rows = float(times[first]), last - first
         gap = (float(times[last]) - begin) / rows
@@ -56,22 +59,25 @@ def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
         if off <= EVEN * ulps[first:last].max():
             count = step_count(gap, dt)
             result.append(EqualSteps(begin, gap / count, rows * count, float(times[last])))
+            counts += [count] * rows
         else:
-            result += equal_steps(times[first : last + 1].tolist(), dt)
-    return result
+            uneven = equal_steps(times[first : last + 1].tolist(), dt)
+            result += uneven
+            counts += [part.steps for part in uneven]
+    return result, np.cumsum(counts)
 
 
-def halved(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
-    """Two steps in place of each."""
-    return [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
+def sampled_numbers(steps: int, every: int, most: int) -> Numbers:
+    """0, so many steps, and between them multiples of `every`: all, or of more than `most` some.
 
-
-def some_of(steps: int, every: int, most: int) -> Numbers:
-    """0, so many steps, and between them multiples of `every`: all, or of more than `most` some, unevenly."""
+    Half of these are spread over the run, unevenly, and half are denser toward its start, for it may end early.
+    """
     count = steps // every
-    k = np.arange(min(count, most))
-    chosen = k if count <= most else ((k + k * GOLDEN % 1.0) * (count / most)).astype(np.int64)
-    return np.unique(np.concatenate([[0], every * (chosen + 1), [steps]]))
+    chosen = np.arange(1.0, min(count, most) + 1.0)
+    if count > most:
+        k = chosen[: most // 2]
+        chosen = np.append((k - 1.0 + k * GOLDEN % 1.0) * (count / len(k)), np.geomspace(1.0, count, len(k)))
+    return np.unique(np.concatenate([[0], every * chosen.astype(np.int64), [steps]]))
 
 
 def instants_of(stretches: Sequence[EqualSteps], numbers: Numbers) -> Array:
@@ -83,16 +89,7 @@ def instants_of(stretches: Sequence[EqualSteps], numbers: Numbers) -> Array:
     return np.where(inside == steps[part], end[part], begin[part] + inside * h[part])
 
 
-def numbers_of(stretches: Sequence[EqualSteps], instants: Array) -> Numbers:
-    """How many steps are done at instants at which steps end, (T,): the other way round."""
-    begin, h, steps, _ = (np.array(column) for column in zip(*stretches, strict=True))
-    part = np.maximum(np.searchsorted(np.sign(h[0]) * begin, np.sign(h[0]) * instants) - 1, 0)
-    inside = np.rint((instants - begin[part]) / h[part]).astype(np.int64)
-    numbers: Numbers = (np.cumsum(steps) - steps)[part] + inside
-    return numbers
-
-
-def longer(t: Array, numbers: Numbers, times: int) -> tuple[list[EqualSteps], Numbers]:
+def longer_steps(t: Array, numbers: Numbers, times: int) -> tuple[list[EqualSteps], Numbers]:
     """Steps so many times as long as those of which so many are done at instants; and how many of them are done there.
 
     Between two instants they are equal, and in all to the last if there are as many.

@@ -20,7 +20,7 @@ from cgraph import Node
 from cgraph.extend import STATEMENTS, Call, If, Program, Statement, While, copied
 
 from ...integrators import Problem
-from ...integrators.statements import Values, call, each, lengths_of, total
+from ...integrators.step import Values, call, each, lengths_of, total
 from ...integrators.step_control import COLLAPSE, RESOLUTION, SMALLEST_ATOL, registers
 from .state_sizes import OTHERS, StateKinds, at_rest, at_rest_registers
 

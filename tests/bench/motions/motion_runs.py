@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -14,9 +13,7 @@ from cgraph._shared import Array
 from dynamics.experiments.accuracy_task import AccuracyTask
 from dynamics.experiments.work_precision.trajectory_runs import Outcome, Run
 from dynamics.integrators import METHODS
-from dynamics.simulation.ensembles.lanes import FEW_TRAJECTORIES
 from dynamics.simulation.ensembles.simulate_many import simulate_many
-from dynamics.simulation.ensembles.task import MAKING
 from dynamics.simulation.simulate import prepare
 from dynamics.simulation.trajectory import Stats
 from tests.bench.motions.trajectory_peers import MOST_STEPS, EndSolver, Heyoka
@@ -79,10 +76,8 @@ class Many(EndSolver):
             return Outcome(ends, steps, rejected, evaluations, status)
 
         run = partial(simulate_many, self.task.model, q, velocities, method=self.name)
-        short, begin = COMPILES * self.task.t_end, time.perf_counter()
+        short = COMPILES * self.task.t_end
         run(t_end=short, **(options | {"t_eval": [short]}))
-        while len(q) >= FEW_TRAJECTORIES and time.perf_counter() - begin < 2.0 * MAKING:  # alone before lanes are made
-            run(t_end=short, **(options | {"t_eval": [short]}))
         return Run(partial(run, t_end=self.task.t_end, **options), read=read)
 
 

@@ -64,7 +64,6 @@ def test_random_graphs_at_many_points_are_those_at_each(case, count, cost, seed)
 @pytest.mark.parametrize("wrt", [None, ["z", "x"], ["unused"]])
 def test_threads_and_chosen_inputs_change_no_bit(backend, cost, wrt, monkeypatch):
     monkeypatch.setattr(derivative, "LEAST_BLOCK", 8)
-    monkeypatch.setattr(derivative, "PANEL_NUMBERS", 40)
     function = compiled(example(), backend, cost, fma=False)
     points = np.random.default_rng(0).uniform(0.1, 1.0, (21, 4))
     check(function, points, threads=2, wrt=wrt)

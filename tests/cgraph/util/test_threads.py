@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.program.runners import native_runner, python_runner, runner
+from cgraph.program.runners import native_runner, python_runner
 from cgraph.util import threads
 from cgraph.util.threads import share, thread_count
 from tests.cgraph.engines import ENGINES
@@ -35,8 +35,8 @@ def function(request, without, monkeypatch):
     if "without" in request.param:
         without("llvmlite")
     monkeypatch.setattr(native_runner, "WORK", 24 * len(graph().nodes))
-    for module in (python_runner, runner):
-        monkeypatch.setattr(module, "BLOCK", 24)
+    for name in ("BLOCK", "STATES"):
+        monkeypatch.setattr(python_runner, name, 24)
     return cg.compile(graph(), request.param.partition(" ")[0])
 
 

@@ -13,8 +13,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
 from dynamics.integrators import derive
-from dynamics.integrators.dop853 import DOP853
-from dynamics.integrators.tableau import DOPRI5, EULER, real_stability
+from dynamics.integrators.tableau import DOP853, DOPRI5, EULER, real_stability
 from dynamics.simulation.run_options import RunOptions
 from dynamics.simulation.stepper import stepper
 from dynamics.simulation.steps.step_program import compile_steps, step_program

@@ -11,7 +11,7 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
-from dynamics.integrators.symplectic_tableaus import COMPOSITIONS, Composition
+from dynamics.integrators.tableau import COMPOSITIONS, Composition
 from tests.dynamics.planet import PERIHELION, cart, planet, position
 from tests.dynamics.step_options import step
 from tests.early_end import stops

@@ -12,7 +12,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS, System
 from dynamics.integrators.step_control import LARGEST_FACTOR
-from dynamics.integrators.symplectic_tableaus import COMPOSITIONS, PARTITIONED
+from dynamics.integrators.tableau import COMPOSITIONS, PARTITIONED
 from tests.dynamics.planet import PERIHELION, cart, planet, position
 from tests.dynamics.scipy_motion import scipy_states
 from tests.dynamics.step_options import EVERY_METHOD, step

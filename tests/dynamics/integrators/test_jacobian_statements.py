@@ -7,7 +7,7 @@ import dynamics as dyn
 from cgraph.extend import Map, Program, runner
 from dynamics.integrators.jacobian_statements import jacobian_statements
 from dynamics.integrators.problem import derive, state_jacobian
-from dynamics.integrators.statements import lengths_of
+from dynamics.integrators.step import lengths_of
 from tests.tolerances import EQUATIONS
 
 

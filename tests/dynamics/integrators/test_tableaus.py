@@ -15,11 +15,9 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
 from dynamics.integrators import runge_kutta
-from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.radau import _A, _POWERS, _T, _T_INVERSE
 from dynamics.integrators.rosenbrock import RODAS5P
-from dynamics.integrators.symplectic_tableaus import PARTITIONED, Partitioned, gauss
-from dynamics.integrators.tableau import TABLEAUS, Tableau
+from dynamics.integrators.tableau import DOP853, PARTITIONED, TABLEAUS, Partitioned, Tableau, gauss
 from tests.dynamics.planet import PERIHELION, planet, position
 from tests.each_row import each_row
 from tests.registered import registered

@@ -1,7 +1,5 @@
 """Gradients are of the default method of `simulate`, or of equal steps that say how far off they are."""
 
-import _thread
-import threading
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -9,7 +7,6 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-import pytest
 from pytest import approx, mark, raises
 
 import cgraph as cg
@@ -166,18 +163,15 @@ def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate() -> Non
             assert np.isnan(array[[1, 3]]).all()
 
 
-@pytest.mark.usefixtures("ctrl_c")
 @mark.parametrize("method", ["dop853", "rk4"])
 @each_row("derive", [dyn.gradient, dyn.gradient_many, dyn.sensitivities])
-def test_ctrl_c_is_a_keyboard_interrupt(derive: Any, method: str) -> None:
+def test_ctrl_c_is_a_keyboard_interrupt(derive: Any, method: str, ctrl_c: Any) -> None:
     loss = [] if derive is dyn.sensitivities else [end]
     start = [[1.0]] if derive is dyn.gradient_many else [1.0]
     events = {} if derive is dyn.gradient_many else {"events": dyn.Event("late", lambda q, qd, t: t - 500.0)}
-    timer = threading.Timer(0.3, _thread.interrupt_main)
-    timer.start()
+    ctrl_c(0.3)
     with raises(KeyboardInterrupt):
         derive(SPRING, *loss, start, [0.0], 1e3 if method == "rk4" else 1e5, method, backend="python", **events)
-    timer.join()
 
 
 @mark.parametrize("given", [{}, {"method": "rk4", "dt": 1e-3, "estimate_error": False}])

@@ -1,9 +1,7 @@
 """A prepared motion: to the bit what `simulate` gives, its end alone, and its steps one by one; from threads, too."""
 
-import _thread
 import math
 import pickle
-import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -227,13 +225,11 @@ def test_prepare_makes_the_machine_code(named: dict[str, Any]) -> None:
     assert end.q[0] == pytest.approx(np.cos(2.0 if "varied" in named else 1.0))
 
 
-@mark.usefixtures("ctrl_c")
 @mark.parametrize("method", ["dop853", "rk4"])
-def test_ctrl_c_ends_a_long_run(method: str) -> None:
+def test_ctrl_c_ends_a_long_run(method: str, ctrl_c: Any) -> None:
     motion = dyn.prepare(ARM, method, **options_of(method))
     end = motion.end(*START, SPAN)
-    timer = threading.Timer(0.3, _thread.interrupt_main)
-    timer.start()
+    ctrl_c(0.3)
     with pytest.raises(KeyboardInterrupt):
         motion.end(*START, 1e7)
     np.testing.assert_array_equal(motion.end(*START, SPAN).q, end.q)  # the memory is as good as before

@@ -9,7 +9,7 @@ from pytest import mark
 
 import dynamics as dyn
 from dynamics import METHODS
-from dynamics.integrators.symplectic_tableaus import COMPOSITIONS
+from dynamics.integrators.tableau import COMPOSITIONS
 from tests.dynamics.scipy_motion import scipy_states
 
 IN_TURN = ("symplectic_euler", "verlet")  # they step coordinates and momenta in turn

@@ -1,8 +1,6 @@
 """simulate: what is recorded, how a run stops, and its statistics."""
 
-import _thread
 import math
-import threading
 import warnings
 from typing import Any
 from unittest.mock import patch
@@ -122,7 +120,6 @@ def test_leaving_a_function_s_domain_stops_the_run() -> None:
 TURN = dyn.Event("turn", lambda q, qd, t: q[0] - 0.5, -1, reset=lambda q, qd, t: (q, [-qd[0]]))
 
 
-@pytest.mark.usefixtures("ctrl_c")
 @mark.parametrize(
     ("method", "options"),
     [
@@ -132,13 +129,14 @@ TURN = dyn.Event("turn", lambda q, qd, t: q[0] - 0.5, -1, reset=lambda q, qd, t:
         ("rk4", {"t_eval": [0.0, 1e3]}),  # the state between these times is the last row
     ],
 )
-def test_ctrl_c_keeps_the_rows(method: str, options: dict[str, Any], capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_keeps_the_rows(
+    method: str, options: dict[str, Any], capsys: pytest.CaptureFixture[str], ctrl_c: Any
+) -> None:
     given = {"method": method, "backend": "python", **step(method, 1e-3), **options}
     dyn.simulate(oscillator(), [1.0], [0.0], 0.1, **given | {"t_eval": None})  # what it needs is made
     watched = "events" in options
     for delay in (1.5 if watched else 0.5, 6.0, 24.0):  # s; a machine that is busy may not have begun after the first
-        timer = threading.Timer(delay, _thread.interrupt_main)
-        timer.start()
+        timer = ctrl_c(delay)
         try:
             run = dyn.simulate(oscillator(), [1.0], [0.0], 1e3, **given, progress=watched)
         except KeyboardInterrupt:  # before the first step

@@ -156,16 +156,12 @@ def test_dask_changes_nothing() -> None:
         assert [each.tolist() for each in gathered(drawn, range(4))] == [drawn(seed).tolist() for seed in range(4)]
 
 
-@mark.usefixtures("ctrl_c")
 @mark.parametrize(("workers", "method"), [(1, "midpoint"), (3, "rk4"), *slow((1, "rk4"), (3, "midpoint"))])
-def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> None:
-    before, main = set(threading.enumerate()), threading.main_thread().ident
-    assert main is not None
+def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str, ctrl_c: Any) -> None:
+    before = set(threading.enumerate())
     model, q, qd = arms(64)
     simulate_many(model, q, qd, 0.01, method, workers=workers)  # the code is made
-    timer = threading.Timer(0.3, lambda: signal.pthread_kill(main, signal.SIGINT))
-    begin = time.perf_counter()
-    timer.start()
+    begin, timer = time.perf_counter(), ctrl_c(0.3)
     with raises(KeyboardInterrupt):
         simulate_many(model, q, qd, 1e9, method, t_eval=[0.0, 1e9], workers=workers, chunk=8)
     timer.join()
