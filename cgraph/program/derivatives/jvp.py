@@ -191,7 +191,7 @@ class Passes(Registers):
         written = effects(program.body)[1]
         kept = [copied(name, name) for name in dict.fromkeys(of) if name not in written]
         self.plain = [self.assignment(each) for each in [*program.body, *kept]]
-        reads = effects(statements_of(self.plain))[0]
+        reads = [name for name in effects(statements_of(self.plain))[0] if name in program.registers]
         handed = [name for name in dict.fromkeys((*of, *reads)) if name in self.current and name not in self.fed]
         self.handed = {name: self.now(name) for name in handed}
         self.constants = [name for name in reads if name not in self.handed and name not in self.fed]
