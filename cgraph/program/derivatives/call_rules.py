@@ -8,8 +8,8 @@ from dataclasses import replace
 from ...core.graph import Graph
 from ..statement import Names
 from ..statements.call import Call, Map, Sum, elements, sizes
-from .jvp import Assignment, Tangent, pushed, split
-from .transpose import Adjoint, pulled
+from .jvp import Assignment, Tangent, split, tangent_graph
+from .transpose import Adjoint, cotangent_graph
 
 Numbers = tuple[int, ...]
 
@@ -33,7 +33,7 @@ def push_elements(assignment: Assignment, tangent: Tangent) -> None:
     moving = tuple([k for k, name in enumerate(names) if name in tangent.dots and tangent.lengths[name]])
     if not moving or tangent.active.isdisjoint(statement.outputs):
         return
-    graph, kept = pushed(statement.graph, lengths, moving, outputs)
+    graph, kept = tangent_graph(statement.graph, lengths, moving, outputs)
     if graph is None:
         return
     dots, of_all = tuple([tangent.dots[names[k]] for k in moving]), sum([k < first for k in moving])
@@ -66,7 +66,7 @@ def pull_elements(assignment: Assignment, adjoint: Adjoint) -> None:
     total, rule = adjoint.rules.get(id(statement.graph), (0, None))
     if not isinstance(statement, Call) or total != sum([outputs[k] for k in seeded]):
         rule = None
-    graph, kept = pulled(statement.graph, rule, lengths, wanted, outputs, seeded)
+    graph, kept = cotangent_graph(statement.graph, rule, lengths, wanted, outputs, seeded)
     if graph is None:
         return
     seeds = tuple([adjoint.bars[statement.outputs[k]] for k in seeded])

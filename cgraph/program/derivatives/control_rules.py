@@ -13,8 +13,8 @@ from ..statement import Statement, bodies_of, effects, reads_and_writes, row_of,
 from ..statements.call import Call, Map, Sum, added, copied, copied_or_zero, zeroed
 from ..statements.control import FixedPoint, If, While
 from ..statements.memory import Pop, Push
-from .jvp import Assignment, Passes, Registers, Tangent, flat
-from .transpose import Adjoint, replayed
+from .jvp import Assignment, Passes, Registers, Tangent, statements_of
+from .transpose import Adjoint, recovery
 
 MOST_TURNS = 200.0
 STALLS = 3.0  # turns whose change is no smaller than before: the rest is rounding
@@ -39,7 +39,7 @@ def assign_if(statement: If, passes: Passes) -> Assignment:
     passes.current = before
     at = [passes.write(name) for name in writes]
     after = tuple([dict(zip(at, end, strict=True)) for end in ends])
-    ways = [(*flat(part), *_handed_on(where)) for part, where in zip(parts, after, strict=True)]
+    ways = [(*statements_of(part), *_handed_on(where)) for part, where in zip(parts, after, strict=True)]
     return Assignment(If(decides, *ways), parts=tuple(parts), after=after)
 
 
@@ -109,7 +109,7 @@ def assign_while(statement: While, passes: Passes) -> Assignment:
     before = dict(passes.current)
     at, turn, after = _turn(statement.body, passes)
     copies = [copied(before.get(name, name), place) for name, place in at.items()]
-    body: list[Statement] = [*flat(turn), *_handed_on(after)]
+    body: list[Statement] = [*statements_of(turn), *_handed_on(after)]
     if passes.turns:
         width = sum([passes.lengths[name] for name in after])
         stack, turns = passes.fresh("stack", passes.turns * width), passes.fresh("turns", 1)
@@ -156,7 +156,7 @@ def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:
     back += [copied_or_zero(inner.bars.get(name), bar) for name, bar in moved.items()]
     back += [copied(bar, bars[name]) for name, bar in moved.items()]
     # x_bar_k = f_x^T x_bar_k+1 and e_bar += f_e^T x_bar_k+1, from the last turn back
-    again = replayed(turn, effects(inner.statements)[0], light=False)[0]
+    again = recovery(turn, effects(inner.statements)[0], light=False)[0]
     adjoint.add(While(left, (Pop(push.stack, left, push.rows), *again, *inner.statements, *back)))
     ends = (*bars.values(), *sums.values(), adjoint.unsolved)  # NaN after turns that the stack had no room for
     adjoint.add(*[Map(_UNLESS_FULL, (end, push.count), (end,)) for end in ends])
@@ -195,7 +195,7 @@ def push_fixed_point(assignment: Assignment, tangent: Tangent) -> None:
     inner = tangent.inner(moving)
     inner.push(turn)
     if tangent.values:
-        tangent.add(*flat(turn))
+        tangent.add(*statements_of(turn))
     rows = [(dot, None, inner.dots.get(after[name])) for name, dot in moving.items()]
     _add_settled(rows, inner.statements, tangent)
     tangent.dots |= {name: inner.dots[end] for name, end in after.items() if end in inner.dots} | moving

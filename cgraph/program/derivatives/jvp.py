@@ -49,7 +49,7 @@ class Assignment:
         return tuple([copy.inputs[0] for copy in self.copies])
 
 
-def flat(assignments: Iterable[Assignment]) -> list[Statement]:
+def statements_of(assignments: Iterable[Assignment]) -> list[Statement]:
     """The statements of assignments, copies included."""
     return [statement for assignment in assignments for statement in assignment.statements]
 
@@ -84,7 +84,7 @@ class Registers:
         return new
 
 
-def product(inputs: Sequence[Node], results: Mapping[int, Sequence[Node]]) -> Product:
+def nonzero(inputs: Sequence[Node], results: Mapping[int, Sequence[Node]]) -> Product:
     """Product with these results by number; a zero that is one whatever the numbers are is left out."""
     kept = {k: nodes for k, nodes in results.items() if any(node.value != 0.0 for node in nodes)}
     nodes = [node for group in kept.values() for node in group]
@@ -92,14 +92,14 @@ def product(inputs: Sequence[Node], results: Mapping[int, Sequence[Node]]) -> Pr
 
 
 @kept_by_first
-def pushed(graph: Graph, inputs: Numbers, moving: Numbers, outputs: Numbers) -> Product:
+def tangent_graph(graph: Graph, inputs: Numbers, moving: Numbers, outputs: Numbers) -> Product:
     """Tangents of outputs from those of the inputs `moving`. Inputs of the graph: its own, tangents.
 
     inputs, outputs: lengths of the registers that are the inputs of the graph, or its outputs.
     """
     groups = split(graph.inputs, inputs)
     made = simplify(jvp(graph, [node for k in moving for node in groups[k]]))
-    return product(made.inputs, dict(enumerate(split(list(made.outputs.values()), outputs))))
+    return nonzero(made.inputs, dict(enumerate(split(list(made.outputs.values()), outputs))))
 
 
 def split(items: Sequence[T], lengths: Sequence[int]) -> list[Sequence[T]]:
@@ -191,7 +191,7 @@ class Passes(Registers):
         written = effects(program.body)[1]
         kept = [copied(name, name) for name in dict.fromkeys(of) if name not in written]
         self.plain = [self.assignment(each) for each in [*program.body, *kept]]
-        reads = effects(flat(self.plain))[0]
+        reads = [name for name in effects(statements_of(self.plain))[0] if name in program.registers]
         handed = [name for name in dict.fromkeys((*of, *reads)) if name in self.current and name not in self.fed]
         self.handed = {name: self.now(name) for name in handed}
         self.constants = [name for name in reads if name not in self.handed and name not in self.fed]
@@ -223,7 +223,7 @@ class Passes(Registers):
         changed = names_in(statement, [each for each in row.writes if each in row.reads])
         return Assignment(new, tuple([copied(before[name], self.now(name)) for name in changed]))
 
-    def pushed(self, directions: Sequence[str], *, values: bool) -> tuple[Tangent, dict[str, str]]:
+    def tangents(self, directions: Sequence[str], *, values: bool) -> tuple[Tangent, dict[str, str]]:
         """Tangents of what a pass hands on and of more, and their registers: they end where the next pass reads them.
 
         values: whether the passes themselves are beside them.
@@ -273,7 +273,7 @@ def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence
     [[9.0, 6.0], [81.0, 108.0]]
     """
     passes = Passes(program, program.record if isinstance(program, Program) else (), wrt, constant)
-    tangent, dots = passes.pushed(list(wrt), values=True)
+    tangent, dots = passes.tangents(list(wrt), values=True)
     body = [*tangent.statements, *[copied(after, before) for before, after in passes.handed.items()]]
     record = [*program.record, *[dots[name] for name in program.record if name in dots]]
     made = passes.program(tangent, body, record, program.feed, {*program.registers, *dots.values()})
@@ -292,7 +292,7 @@ def _active(assignments: Sequence[Assignment], moving: Set[str], constant: Set[s
     """Registers that depend on those that move; of an iteration, on what it reads and not on where it began."""
     active = set(moving)
     for each in assignments:
-        inputs = effects(flat(each.parts[0]) if each.carried else each.statements)[0]
+        inputs = effects(statements_of(each.parts[0]) if each.carried else each.statements)[0]
         if active & (set(inputs) - set(each.carried)):
             active |= {name for name in reads_and_writes(each.statement)[1] if name.partition(own)[0] not in constant}
             for part in each.parts:

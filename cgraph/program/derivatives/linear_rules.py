@@ -99,13 +99,13 @@ def push_moved(assignment: Assignment, tangent: Tangent) -> None:
     givers = {*names_in(statement, read), *[before[name] for name in written if name in before]}
     if givers.isdisjoint(tangent.dots) or tangent.active.isdisjoint(written):
         return
-    pushed = with_names(statement, read, lambda name: tangent.dots.get(name) or tangent.zero(name))
+    moved_dots = with_names(statement, read, lambda name: tangent.dots.get(name) or tangent.zero(name))
     dots = {name: tangent.dot(name) for name in written}
     works = {name: dots.get(name) or tangent.fresh(name, tangent.lengths[name]) for name in changed}
     for name, work in works.items():
         old = before[name]
         tangent.add(copied_or_zero(tangent.dots.get(old), work) if name in dots else copied(old, work))
-    tangent.add(with_names(pushed, row.writes, {**works, **dots}.__getitem__))
+    tangent.add(with_names(moved_dots, row.writes, {**works, **dots}.__getitem__))
 
 
 def pull_take(assignment: Assignment, adjoint: Adjoint) -> None:

@@ -22,17 +22,17 @@ from ..runners.choose_runner import runner
 from ..runners.runner import Runner
 from ..statement import Statement, effects, needed, reads_and_writes, row_of
 from ..statements.call import Call, added, copied, copied_or_zero
-from .jvp import Assignment, Linearized, Numbers, Passes, Product, Registers, flat, product, split
+from .jvp import Assignment, Linearized, Numbers, Passes, Product, Registers, nonzero, split, statements_of
 
 HEAVY_GRAPH = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
 TURNS = 64  # of a loop that its stack has room for, unless more are asked for
 TAPE_BLOCK = 4096  # passes in a block of a tape
-Pullback = Callable[[Sequence[Node]], Graph]  # a graph's own rule: cotangents of these inputs, see `pulled`
+Pullback = Callable[[Sequence[Node]], Graph]  # a graph's own rule: cotangents of these inputs, see `cotangent_graph`
 Rules = Mapping[int, tuple[int, Pullback]]  # by the id of a graph; and how many of its first outputs have cotangents
 
 
 @kept_by_first
-def pulled(
+def cotangent_graph(
     graph: Graph, rule: Pullback | None, inputs: Numbers, wanted: Numbers, outputs: Numbers, seeded: Numbers
 ) -> Product:
     """Cotangents of the inputs `wanted` from those of the outputs `seeded`. Inputs of the graph: its own, cotangents.
@@ -47,7 +47,7 @@ def pulled(
     else:
         made = rule(by)
     results = split(list(made.outputs.values()), [len(groups[k]) for k in wanted])
-    return product(made.inputs, dict(zip(wanted, results, strict=True)))
+    return nonzero(made.inputs, dict(zip(wanted, results, strict=True)))
 
 
 class Adjoint(Registers):
@@ -89,7 +89,7 @@ class Adjoint(Registers):
         self.add(added(before, bar, after))
 
 
-def replayed(
+def recovery(
     assignments: Sequence[Assignment], values: Iterable[str], *, light: bool = True
 ) -> tuple[list[Statement], list[str], set[str]]:
     """How values that assignments computed come back: statements, registers of a record, and what both begin with.
@@ -113,7 +113,7 @@ def replayed(
 def _unrun(assignment: Assignment) -> list[Statement]:
     """Statements that the passes do not run: of iterations, also inside others, one more turn."""
     if assignment.carried:
-        return flat(assignment.parts[0])
+        return statements_of(assignment.parts[0])
     return [statement for part in assignment.parts for each in part for statement in _unrun(each)]
 
 
@@ -151,7 +151,7 @@ def tangent(passes: Passes, record: Sequence[str], then: Sequence[Statement] = (
     It is fed what was recorded, and records the tangents of `record` after a pass.  then: what else it does with
     the tangents, {name}:dot.
     """
-    made, dots = passes.pushed([*passes.inputs, *passes.varied], values=False)
+    made, dots = passes.tangents([*passes.inputs, *passes.varied], values=False)
     made.add(*then)
     return _along(passes, made, dots, [dots[name] for name in record])
 
@@ -159,7 +159,7 @@ def tangent(passes: Passes, record: Sequence[str], then: Sequence[Statement] = (
 def _along(passes: Passes, made: Registers, vectors: Mapping[str, str], record: Sequence[str]) -> Linearized:
     """The statements that were made, after those that compute what they need of a pass from what was recorded of it."""
     linear = needed(made.statements, {*vectors.values(), *record, made.unsolved})
-    again, tape, wanted = replayed(passes.plain, effects(linear)[0])
+    again, tape, wanted = recovery(passes.plain, effects(linear)[0])
     feed = [*[name for name in (*passes.fed, *passes.handed) if name in wanted], *tape]
     program = passes.program(made, [*again, *linear], record, feed, {*vectors.values(), *passes.constants})
     return Linearized(program, vectors, made.unsolved)
@@ -178,7 +178,7 @@ class Along:
     ) -> None:
         handed, record = passes.handed, [*linear.program.feed, *more]
         ends = [handed.get(name, name) for name in results]
-        body = needed(flat(passes.plain), {*handed.values(), *ends, *record})
+        body = needed(statements_of(passes.plain), {*handed.values(), *ends, *record})
         begin = [copied(after, before) for before, after in handed.items() if passes.lengths[before]]
         own = [name for name in passes.lengths if passes.own not in name]
         forward = passes.program(passes, [*begin, *body], record, passes.fed, [*ends, *own])
@@ -227,7 +227,7 @@ class Tape:
             rows = run_passes(self.of.forward, self.memory, last - first, part, self.feed(first, last))
             self.blocks.append(Block(first, last, rows if before is None else before))
 
-    def recorded(self, *, backwards: bool) -> Iterator[Block]:
+    def records(self, *, backwards: bool) -> Iterator[Block]:
         """The blocks with the rows of every pass, (passes, width, N), from the last one back if asked."""
         for block in reversed(self.blocks) if backwards else self.blocks:
             first, last, kept = block
@@ -240,7 +240,7 @@ class Tape:
         name = self.of.passes.handed.get(name, name)
         return self.of.forward.read(self.memory if memory is None else memory, name).copy()
 
-    def derivative(self, vectors: Mapping[str, Array], many: int) -> Array:
+    def derivative_memory(self, vectors: Mapping[str, Array], many: int) -> Array:
         """Memories of the derivative, with these vectors of the registers that have one."""
         names = self.of.linear.vectors
         values = {name: self.value(name) for name in self.of.passes.constants}
@@ -252,10 +252,10 @@ class Tape:
         read, linear = self.of.derivative.read, self.of.linear
         return {name: read(memory, at).copy() for name, at in linear.vectors.items()}, read(memory, linear.unsolved)[0]
 
-    def pulled(self, seeds: Mapping[str, Array]) -> tuple[dict[str, Array], Array, Array]:
+    def cotangents(self, seeds: Mapping[str, Array]) -> tuple[dict[str, Array], Array, Array]:
         """Cotangents before the passes, of those after them; the record, (passes, width, N); and what is unsolved."""
-        ready, memory, parts = self.of.derivative, self.derivative(seeds, self.memory.shape[1]), []
-        for first, last, rows in self.recorded(backwards=True):
+        ready, memory, parts = self.of.derivative, self.derivative_memory(seeds, self.memory.shape[1]), []
+        for first, last, rows in self.records(backwards=True):
             fed = rows[::-1, : ready.program.feed_width]
             parts.append(run_passes(ready, memory, last - first, 1, fed)[::-1])
         bars, unsolved = self.vectors(memory)
@@ -334,8 +334,8 @@ class ProgramVjp:
         if rows.ndim != 2 or len(rows) != passes:
             raise GraphError(f"the feed needs a row for each of {passes} passes, got shape {rows.shape}")
         lengths, inner = self.forward.program.registers, {*self.handed.values()}
-        own, start, cotangents = [name for name in lengths if name not in inner], dict[str, Array](), dict[str, Array]()
-        for what, given, known, to in (("values", values, own, start), ("seeds", seeds, self._of, cotangents)):
+        own, start, bars_after = [name for name in lengths if name not in inner], dict[str, Array](), dict[str, Array]()
+        for what, given, known, to in (("values", values, own, start), ("seeds", seeds, self._of, bars_after)):
             for name, numbers in require_mapping(what, given, "register: numbers").items():
                 if name not in known:
                     raise GraphError(f"{what} must be of registers among {', '.join(known)}, got {name!r:.60}")
@@ -344,7 +344,7 @@ class ProgramVjp:
                     raise GraphError(f"{what}[{name!r}] needs shape ({lengths[name]},), got {to[name].shape}")
         tape = Tape(self._along, start, lambda first, last: rows[first:last, :, None], checkpoints=self._checkpoints)
         tape.run(0, passes)
-        bars, slopes, unsolved = tape.pulled(cotangents)
+        bars, slopes, unsolved = tape.cotangents(bars_after)
         if np.isnan(unsolved[0]):
             turns = self._along.passes.turns
             raise GraphError(f"a loop took more turns than the {turns} there is room for: give turns=")

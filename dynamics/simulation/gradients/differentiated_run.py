@@ -77,11 +77,11 @@ class DifferentiatedRun:
         )
         self.segments: list[Segment] = []
         begin = float(motions.steps[0].t[0])
-        x = self._through(motions.equations.start, motions.x, begin)
+        x = self._state(motions.equations.start, motions.x, begin)
         for stretch, kept in zip(motions.steps, every or itertools.repeat(0), strict=False):
-            self.segments.append(self._segment(stretch.begun(begin), x, kept))
+            self.segments.append(self._segment(stretch.beginning_at(begin), x, kept))
             begin = float(self.segments[-1].steps.t[-1])
-            x = self._through(self._reset(stretch), self.segments[-1].x, begin)
+            x = self._state(self._reset(stretch), self.segments[-1].x, begin)
         self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
         self.loss = np.zeros(motions.many)
         if running is not None:
@@ -90,7 +90,7 @@ class DifferentiatedRun:
     @property
     def end(self) -> Array:
         """The end of the motions in q and qd, (m, N)."""
-        return self._through(self.motions.equations.end, self.x, float(self.t[-1]))
+        return self._state(self.motions.equations.end, self.x, float(self.t[-1]))
 
     @property
     def checkpoints(self) -> int:
@@ -149,9 +149,9 @@ class DifferentiatedRun:
             run_passes(tape.of.forward, memory, 1, 1, tape.feed(count - 1, count))
             x = tape.value("x", memory)
             point = self.motions.point(x, t[-1])
-            slopes, x_dot = self._gradient_at(event.name, x, t[-1]), _evaluated(self.motions.problem.rate, point)
+            slopes, x_dot = self._gradient_at(event.name, x, t[-1]), _outputs(self.motions.problem.rate, point)
             # Newton's method: h -= g / (dg/dx xdot + dg/dt)
-            change = float((_evaluated(event.values, point) / (slopes[: len(x)].T @ x_dot + slopes[len(x)]))[0, 0])
+            change = float((_outputs(event.values, point) / (slopes[: len(x)].T @ x_dot + slopes[len(x)]))[0, 0])
             if not abs(change) < last:
                 break
             last = abs(change)
@@ -190,23 +190,23 @@ class DifferentiatedRun:
             numbers, rows = [*numbers, np.array([count])], [*rows, segment.x[None]]
         return np.concatenate([[0], *numbers]), np.concatenate([segment.begin[None], *rows])
 
-    def pulled(self, bars: Array) -> tuple[Array, Array]:
+    def cotangents(self, bars: Array) -> tuple[Array, Array]:
         """Cotangents (m + 1 + .., N) of start, t and inputs, from those of the end; and rows of forces of each step."""
         m, motions = len(self.x), self.motions
         for k, segment in reversed(list(enumerate(self.segments))):
             steps, end, later = segment.steps, segment.steps.t[-1], 0.0
             if (reset := self._reset(steps)) is not None:
-                bars = self._pulled_at(reset, segment.x, end, bars)
+                bars = self._cotangents_at(reset, segment.x, end, bars)
             if steps.event:
                 g = self._gradient_at(steps.event, segment.x, end)
                 # lambda with h_bar = x_bar dx/dh + t_bar + lambda (dg/dx dx/dh + dg/dt) = 0
                 slope = self._by_last_length(segment, g[:m]) + g[m]
                 bars = bars - (self._by_last_length(segment, bars[:m]) + bars[m]) / slope * g
                 later = float(bars[m, 0])
-            vectors, rows, failed = segment.tape.pulled({"x": bars[:m], LOSS: np.ones(1)})
+            vectors, rows, failed = segment.tape.cotangents({"x": bars[:m], LOSS: np.ones(1)})
             self._require_solved(failed)
             if segment.start is not None:
-                vectors, _, failed = segment.start.pulled(vectors)
+                vectors, _, failed = segment.start.cotangents(vectors)
                 self._require_solved(failed)
             begin, lengths = vectors.get("t", np.zeros((1, motions.many))), motions.equations.lengths
             if k:
@@ -219,21 +219,21 @@ class DifferentiatedRun:
                 begin = begin + (t @ steps.by_t[:-1] + h @ steps.by_h)
             inputs = [vectors.get(name, np.zeros((length, motions.many))) for name, length in lengths.items()]
             bars = np.concatenate([vectors["x"], begin, bars[m + 1 :] + np.concatenate(inputs)])
-        return self._pulled_at(motions.equations.start, motions.x, float(self.t[0]), bars), rows
+        return self._cotangents_at(motions.equations.start, motions.x, float(self.t[0]), bars), rows
 
     def _by_last_length(self, segment: Segment, seed: Array) -> float:
         """Cotangent of h of the last step of one motion, from that of x (m, 1) after it: t and h are what varies."""
         tape, derivative = segment.tape, segment.tape.of.derivative
-        memory, (_, _, rows) = tape.derivative({"x": seed}, 1), next(tape.recorded(backwards=True))
+        memory, (_, _, rows) = tape.derivative_memory({"x": seed}, 1), next(tape.records(backwards=True))
         return float(run_passes(derivative, memory, 1, 1, rows[-1:, : derivative.program.feed_width])[0, 1, 0])
 
-    def pushed(self, dots: Array) -> tuple[Array, Array, Array, Array]:
+    def tangents(self, dots: Array) -> tuple[Array, Array, Array, Array]:
         """Rows of one motion, t (T,) and q with qd (T, m), and the tangents of both, (T, k) and (T, m, k).
 
         dots: tangents (m + 1 + .., k) of the start, of t and of inputs, along k directions.
         """
         m, motions = len(self.x), self.motions
-        dots = self._pushed_at(motions.equations.start, motions.x, float(self.t[0]), dots)
+        dots = self._tangents_at(motions.equations.start, motions.x, float(self.t[0]), dots)
         parts = []
         for segment in self.segments:
             steps, end = segment.steps, float(segment.steps.t[-1])
@@ -254,7 +254,7 @@ class DifferentiatedRun:
                 times[-1] = times[-2] + length
             parts.append((steps.t, states, times, tangents))
             dots = np.concatenate([tangents[-1], times[-1:], dots[m + 1 :]])
-            dots = self._pushed_at(self._reset(steps), segment.x, end, dots)
+            dots = self._tangents_at(self._reset(steps), segment.x, end, dots)
         if self._reset(self.segments[-1].steps) is not None:
             parts.append((self.t[-1:], self.x.T, dots[m : m + 1], dots[None, :m]))
         t, x, t_dot, x_dot = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -273,15 +273,15 @@ class DifferentiatedRun:
         tape, start, m, many = segment.tape, segment.start, len(self.x), dots.shape[1]
         vectors = {"x": dots[:m], "t": dots[m : m + 1], **self.motions.equations.registers(dots[m + 1 :])}
         if start is not None:
-            memory = start.derivative(vectors, many)
-            _run_all(start.of.derivative, memory, next(start.recorded(backwards=False)).kept)
+            memory = start.derivative_memory(vectors, many)
+            _run_all(start.of.derivative, memory, next(start.records(backwards=False)).kept)
             found, failed = start.vectors(memory)
             self._require_solved(failed)
             vectors |= found
-        push, names, memory = tape.of.derivative, tape.of.linear.vectors, tape.derivative(vectors, many)
+        push, names, memory = tape.of.derivative, tape.of.linear.vectors, tape.derivative_memory(vectors, many)
         states, tangents = [segment.begin.T], [push.read(memory, names["x"]).copy()[None]]
         changes = set((np.flatnonzero((np.diff(lengths, axis=0) != 0.0).any(axis=1)) + 1).tolist())
-        for first, last, rows in tape.recorded(backwards=False):
+        for first, last, rows in tape.records(backwards=False):
             states.append(rows[:, -m:, 0])
             for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
                 if len(lengths):
@@ -297,27 +297,27 @@ class DifferentiatedRun:
 
     def _gradient_at(self, event: str, x: Array, t: float) -> Array:
         """Slopes of an event's quantity by x, t and inputs, (m + 1 + .., 1)."""
-        return _evaluated(_pullback(self.events[event].values), np.append(self.motions.point(x, t), [[1.0]], axis=0))
+        return _outputs(_pullback(self.events[event].values), np.append(self.motions.point(x, t), [[1.0]], axis=0))
 
-    def _pulled_at(self, graph: Graph | None, x: Array, t: float, bars: Array) -> Array:
+    def _cotangents_at(self, graph: Graph | None, x: Array, t: float, bars: Array) -> Array:
         """Cotangents (m + 1 + .., N) of x, t and inputs, with those of the state that a graph makes of them."""
         if graph is None:
             return bars
         m = len(x)
-        before = _evaluated(_pullback(graph), np.concatenate([self.motions.point(x, t), bars[:m]]))
+        before = _outputs(_pullback(graph), np.concatenate([self.motions.point(x, t), bars[:m]]))
         before[m:] += bars[m:]
         return before
 
-    def _pushed_at(self, graph: Graph | None, x: Array, t: float, dots: Array) -> Array:
+    def _tangents_at(self, graph: Graph | None, x: Array, t: float, dots: Array) -> Array:
         """Tangents (m + 1 + .., k) of x, t and inputs, x the state that a graph makes of them."""
         if graph is None:
             return dots
         moved = values_of(_tangent(graph), [*self.motions.point(x, t), *dots], dots.shape[1])
         return np.concatenate([moved, dots[len(x) :]])
 
-    def _through(self, graph: Graph | None, x: Array, t: float) -> Array:
+    def _state(self, graph: Graph | None, x: Array, t: float) -> Array:
         """The states (m, N) that a graph over the states, t and parameters makes of some; the same without a graph."""
-        return x if graph is None else _evaluated(graph, self.motions.point(x, t))
+        return x if graph is None else _outputs(graph, self.motions.point(x, t))
 
 
 def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
@@ -343,7 +343,7 @@ def _tangent(graph: Graph) -> Graph:
     return cg.jvp(graph)
 
 
-def _evaluated(graph: Graph, points: Array) -> Array:
+def _outputs(graph: Graph, points: Array) -> Array:
     """The outputs, (k, N), of a graph at points (n, N)."""
     count = points.shape[1]
     return values_of(graph, points if count > 1 else points[:, 0].tolist(), count)

@@ -33,7 +33,7 @@ def doubts(
     slopes: of the losses by the starts of the motions and by their ends, (m, N).
     """
     said = [[*run.motions.said] for _ in range(run.motions.many)]
-    for sentences in (_unreached(run), _half_steps(run), [] if slopes is None else _grown(run, *slopes)):
+    for sentences in (_other_momenta(run), _half_steps(run), [] if slopes is None else _chaos(run, *slopes)):
         for texts, more in zip(said, sentences, strict=False):  # no sentences: of no motion
             texts += more
     whole = [each.reshape(-1, len(said)) for each in gradients.values()]
@@ -47,7 +47,7 @@ def doubts(
     return said
 
 
-def _unreached(run: DifferentiatedRun) -> list[list[str]]:
+def _other_momenta(run: DifferentiatedRun) -> list[list[str]]:
     """Doubts about velocities of motions in momenta."""
     motions, problem = run.motions, run.motions.problem
     if problem.missing is None:
@@ -59,7 +59,7 @@ def _unreached(run: DifferentiatedRun) -> list[list[str]]:
     return [unreached_momenta(problem, t, x, p, start=(float(t[0]), start, x[0])) for start, x, p in starts]
 
 
-def _grown(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
+def _chaos(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
     """Flag of every motion: whether the error at its start may change the loss by more than its own size does.
 
     start, end: slopes of the loss by the state there. Of a loss along the way alone, its value is compared.
@@ -91,7 +91,9 @@ def _half_steps(run: DifferentiatedRun) -> list[list[str]]:
     if not options.estimated:
         return []
     tau = np.repeat(motions.tau, 2, axis=0) if motions.each_step else motions.tau
-    beside = replace(motions, x=motions.x * ASIDE, steps=tuple([each.steps.halved() for each in run.segments]), tau=tau)
+    beside = replace(
+        motions, x=motions.x * ASIDE, steps=tuple([each.steps.half_steps() for each in run.segments]), tau=tau
+    )
     every = [2 * (each.tape.checkpoints or max(1, len(each.steps.h) // LOOKS)) for each in run.segments]
     try:
         other = DifferentiatedRun(beside, run.running, forwards=run.forwards, every=every)

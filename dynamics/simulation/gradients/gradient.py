@@ -25,7 +25,7 @@ from ..run_options import Options
 from ..trajectory import SimulationWarning
 from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
-from .motion_programs import at
+from .motion_programs import outputs_at
 from .motions import TORQUE, Loss, Motions, motions_of
 
 LOSSES_KEPT = 64  # losses whose graphs stay for another run
@@ -157,7 +157,7 @@ def gradient(
     """
     losses = loss, running
     motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, as_events(events), losses, options)
-    run, values, slopes, bars = differentiated(motions, *losses)
+    run, values, slopes, bars = losses_and_gradients(motions, *losses)
     for text in doubts(run, values, slopes, bars)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     nq, x = motions.problem.nq, run.end[:, 0]
@@ -165,7 +165,7 @@ def gradient(
     return MotionGradient(float(values[0]), gradients, run.t, x[:nq], x[nq:], run.checkpoints)
 
 
-def differentiated(
+def losses_and_gradients(
     motions: Motions, loss: Loss | None, running: Loss | None
 ) -> tuple[DifferentiatedRun, Array, dict[str, Array], tuple[Array, Array]]:
     """The run of motions, losses (N,), their gradients (.., N) by names, and their slopes by start and end, (m, N)."""
@@ -179,10 +179,12 @@ def differentiated(
     run = DifferentiatedRun(motions, total)
     point = run.motions.point(run.x, float(run.t[-1]))
     value, *slopes = (
-        np.zeros_like(point[:1]) if final is None else at(with_slopes(final, motions.options.backend), point)
+        np.zeros_like(point[:1])
+        if final is None
+        else outputs_at(loss_and_slopes(final, motions.options.backend), point)
     )
     end = np.array(slopes) if slopes else np.zeros_like(point)
-    start, rows = run.pulled(end)
+    start, rows = run.cotangents(end)
     gradients = motions.by_names(start)
     if motions.each_step and TORQUE in gradients:
         rows[-1] += end[problem.size + 1 :][: equations.forces]  # what the final loss has of the force itself
@@ -256,7 +258,7 @@ def gradient_many(
     early, said, parts = dict[int, str](), dict[int, str](), [range(*ends) for ends in itertools.pairwise(begins)]
     for part in parts:
         try:
-            run, losses_of_part, slopes, bars = differentiated(motions.of(slice(part.start, part.stop)), *losses)
+            run, losses_of_part, slopes, bars = losses_and_gradients(motions.of(slice(part.start, part.stop)), *losses)
         except MotionError as error:
             if len(part) == 1:
                 early[part[0]] = str(error)
@@ -311,7 +313,7 @@ def _bound(quantity: _Quantity) -> Graph:
 
 
 @kept_by_first
-def with_slopes(graph: Graph, backend: str) -> Any:
+def loss_and_slopes(graph: Graph, backend: str) -> Any:
     """The loss, and its slopes by all inputs, as a function."""
     slopes = cg.gradient(graph)
     both = {"loss": graph.only_output()} | {f"slope{k}": node for k, node in enumerate(slopes.outputs.values())}

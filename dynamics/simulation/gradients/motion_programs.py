@@ -64,11 +64,13 @@ class MotionEquations:
 
     def values(self, p: Array, backend: str) -> Array:
         """p and c, (P + C, N), from p (P, N)."""
-        return p if self.numbers is None else at(compiled(self.numbers, backend), p)
+        return p if self.numbers is None else outputs_at(function_of(self.numbers, backend), p)
 
     def by_parameters(self, p: Array, bars: Array, backend: str) -> Array:
         """Cotangents of p from those of p and c."""
-        return bars if self.numbers is None else at(pulled_back(self.numbers, backend), np.concatenate([p, bars]))
+        return (
+            bars if self.numbers is None else outputs_at(pullback_of(self.numbers, backend), np.concatenate([p, bars]))
+        )
 
 
 @kept_by_first
@@ -126,18 +128,18 @@ def _apart(
 
 
 @kept_by_first
-def compiled(graph: Graph, backend: str) -> Any:
+def function_of(graph: Graph, backend: str) -> Any:
     """The graph as a function."""
     return cg.compile(graph, backend)
 
 
 @kept_by_first
-def pulled_back(graph: Graph, backend: str) -> Any:
+def pullback_of(graph: Graph, backend: str) -> Any:
     """J^T y_bar as a function of the inputs, then y_bar."""
     return cg.compile(cg.simplify(cg.vjp(graph)), backend)
 
 
-def at(function: Any, x: Array) -> Array:
+def outputs_at(function: Any, x: Array) -> Array:
     """The outputs, (k, N), at points (n, N)."""
     values: Array = function(x[:, 0])[:, None] if x.shape[1] == 1 else function.batch(x)
     return values

@@ -29,7 +29,7 @@ from ..run_options import METHOD, Options, RunOptions, time_span
 from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
-from .motion_programs import MotionEquations, at, motion_equations
+from .motion_programs import MotionEquations, motion_equations, outputs_at
 
 Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"
@@ -53,14 +53,14 @@ class Stretch(NamedTuple):
     by_h: Array
     event: str = ""
 
-    def begun(self, t: float) -> Stretch:
+    def beginning_at(self, t: float) -> Stretch:
         """The steps where they begin at another instant."""
         later = t - self.t[0]
         if not (later or self.event):
             return self
         return self._replace(t=self.t + self.by_t * later, h=self.h + self.by_h * later)
 
-    def halved(self) -> Stretch:
+    def half_steps(self) -> Stretch:
         """Steps of half the length."""
         half, by_half = 0.5 * self.h, 0.5 * self.by_h
         ways = [(self.t, half), (self.by_t, by_half)]
@@ -138,7 +138,9 @@ class Motions:
         problem, equations = self.problem, self.equations
         q, x, inputs = bars[: problem.nq], bars[: problem.size], bars[problem.size + 1 :]
         if START in self.wrt and problem.system is not None and problem.system.kinematics.quasi is not None:
-            q = at(_by_displacements(problem.system, self.options.backend), np.concatenate([self.x[: problem.nq], q]))
+            q = outputs_at(
+                _by_displacements(problem.system, self.options.backend), np.concatenate([self.x[: problem.nq], q])
+            )
         by = {START: q, VELOCITY: x[problem.nq :], TORQUE: inputs[: equations.forces]}
         if self.by_parameters:
             p, of_p = self.values[: len(equations.names)], inputs[equations.forces :]

@@ -123,7 +123,7 @@ def sensitivities(
     # a column for each number of `wrt`: the transpose of how cotangents of it are made of those of x, t and inputs
     units = np.eye(len(motions.point()))
     by = {name: np.atleast_2d(rows) for name, rows in motions.of([0] * len(units)).by_names(units).items()}
-    t, x, t_dot, x_dot = run.pushed(np.concatenate([*by.values()]).T)
+    t, x, t_dot, x_dot = run.tangents(np.concatenate([*by.values()]).T)
     ends, nq = np.cumsum([len(rows) for rows in by.values()]), motions.problem.nq
     columns: dict[str, Any] = {name: slice(end - len(by[name]), end) for name, end in zip(by, ends, strict=True)}
     columns |= {name: end - 1 for name, end in zip(by, ends, strict=True) if name in motions.equations.names}

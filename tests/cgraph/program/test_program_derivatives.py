@@ -305,10 +305,10 @@ def test_tangents_along_a_tape_are_those_beside_the_values(seed: int) -> None:
     ready = Along(passes, tangent(passes, names), [], "python")
     tape = Tape(ready, start, lambda first, last: feed[first:last, :, None])
     tape.run(0, PASSES)
-    memory, vectors = tape.derivative(along_dots, 1), ready.linear.vectors
+    memory, vectors = tape.derivative_memory(along_dots, 1), ready.linear.vectors
     for k in range(PASSES):
         ready.derivative.write(memory, vectors["f"], feed_along[k][:, None])
-        (block,) = tape.recorded(backwards=False)
+        (block,) = tape.records(backwards=False)
         dots = run_passes(ready.derivative, memory, 1, 1, block.kept[k : k + 1])[0, :, 0]
     moved = program_jvp(program, [*START, "f"], constant=["turns", "count"])
     beside = runner(moved.program, "python")
