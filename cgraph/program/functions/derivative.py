@@ -340,7 +340,7 @@ class Derivatives:
         entries = symmetric(pattern(reverse_products(self._graph, wrt, zero_wins=False), wrt))
         if not len(entries.rows):
             return self._colored(entries, (), size)
-        derivative = _guarded(partial(_second_products, self._graph, wrt), len(wrt))
+        derivative = _derivative_of(partial(_second_products, self._graph, wrt), len(wrt))
         # symmetric, by products with sums of its columns
         colors = np.array(star_coloring(entries), dtype=np.int64)
         count = int(colors.max(initial=NONE)) + 1
@@ -358,8 +358,8 @@ class Derivatives:
     def _derivative(self, chosen: Chosen, reverse: bool) -> Derivative:
         wrt = self._wrt(chosen)
         if reverse:
-            return _guarded(partial(reverse_products, self._graph, wrt), len(self._graph.outputs))
-        return _guarded(partial(forward_products, self._graph, wrt), len(wrt))
+            return _derivative_of(partial(reverse_products, self._graph, wrt), len(self._graph.outputs))
+        return _derivative_of(partial(forward_products, self._graph, wrt), len(wrt))
 
     @cached_property
     def _graph(self) -> Graph:
@@ -371,7 +371,7 @@ class Derivatives:
         return self._graph.inputs if chosen is None else tuple([self._graph.inputs[k] for k in chosen])
 
 
-def _guarded(derive: Callable[..., Graph], directions: int) -> Derivative:
+def _derivative_of(derive: Callable[..., Graph], directions: int) -> Derivative:
     """The derivative in which zeros win over infinite slopes; where that takes long, only where there are such."""
     plain = direction_split(derive(zero_wins=False), directions, divide=False)
     guarded = direction_split(derive(zero_wins=True), directions)

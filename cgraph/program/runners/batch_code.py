@@ -79,12 +79,12 @@ class BatchCode:
         self._free.append(memory)
 
 
-def beside(program: Program) -> Program:
+def masked_program(program: Program) -> Program:
     """The program of memories side by side, see `many`."""
     return many(program)
 
 
-def kept_beside(program: Program, kept: Sequence[str], alike: bool) -> Program:
+def lane_program(program: Program, kept: Sequence[str], alike: bool) -> Program:
     """The same, fused, which puts back the registers `kept` where a memory rests."""
     return fused(many_keeping(program, kept), alike=alike)
 

@@ -78,7 +78,7 @@ class NativeRunner(Runner):
     @cached_property
     def masked(self) -> Program:
         """The program of memories side by side, see `many`."""
-        program: Program = self._side.beside(self.program)
+        program: Program = self._side.masked_program(self.program)
         return program
 
     @cached_property
@@ -172,7 +172,7 @@ class NativeRunner(Runner):
         kept = [name for name in lengths if name in first]
         ordered = {name: lengths[name] for name in dict.fromkeys([*kept, *lengths])}
         with without_collection():
-            masked = self._side.kept_beside(replace(self._fused, registers=ordered), kept, alike)
+            masked = self._side.lane_program(replace(self._fused, registers=ordered), kept, alike)
             text = self._side.lane_ir(masked, sum([lengths[name] for name in kept]), clock, arithmetic)
         code: LaneCode = self._side.LaneCode(self._compiled(text.source, lanes), masked, kept, lanes, text.size)
         return code

@@ -162,7 +162,7 @@ _ADDED = Graph([_A, _B], {"sum": _A + _B})
 # what registers must fit
 
 
-def _where(statement: Call | Map | Sum) -> str:
+def _statement_text(statement: Call | Map | Sum) -> str:
     """How an error calls a statement."""
     graph = statement.graph
     return (
@@ -172,7 +172,7 @@ def _where(statement: Call | Map | Sum) -> str:
 
 def check_call(call: Call, lengths: Lengths) -> None:
     """Raises GraphError if the registers do not hold as many numbers as the graph has inputs and outputs."""
-    where = _where(call)
+    where = _statement_text(call)
     _require_total(where, lengths, "inputs", call.inputs, len(call.graph.inputs))
     _require_total(where, lengths, "outputs", call.outputs, len(call.graph.outputs))
     require_once(where, call.outputs)
@@ -180,7 +180,7 @@ def check_call(call: Call, lengths: Lengths) -> None:
 
 def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
-    where, graph, outputs = _where(statement), statement.graph, statement.outputs
+    where, graph, outputs = _statement_text(statement), statement.graph, statement.outputs
     known = sum([length_of(lengths, where, name) for name in statement.shared])
     if known > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")

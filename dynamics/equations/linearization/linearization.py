@@ -111,19 +111,19 @@ def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows
     """The last: forces and damping of the system, which may be given anew."""
     n, velocity = system.n, form == "velocity"
     if velocity and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // FORWARD_SHARE:
-        return _displaced(system)
+        return _displaced_rates(system)
     parts = linearization_parts(system) if velocity else momentum_parts(system)
     if velocity and parts.size >= WRITTEN_OUT:
-        return _displaced(system)
+        return _displaced_rates(system)
     graph = parts.written_out()
     above = np.eye(n if velocity and system.kinematics.quasi is None else 0, 3 * n, n)
     below = range(len(above), 2 * n)
     names = [[*[f"A_{i}_{j}" for j in range(2 * n)], *[f"B_{i}_{j}" for j in range(n)]] for i in below]
-    rows = _numbered(graph.inputs, [graph.outputs[name] for row in names for name in row])
+    rows = _numbered_graph(graph.inputs, [graph.outputs[name] for row in names for name in row])
     return LinearRows(rows, graph.input_names, (), above)
 
 
-def _displaced(system: System) -> LinearRows:
+def _displaced_rates(system: System) -> LinearRows:
     """The rates (xi_dot, qdd) at a state moved by displacements xi from 0, which where velocities are rates are q."""
     equations, kinematics, n = forward_dynamics(system), system.kinematics, system.n
     inputs, xi, rates = equations.inputs, system.q, system.qd
@@ -136,11 +136,11 @@ def _displaced(system: System) -> LinearRows:
             turned = [sum([c * x for c, x in zip(row, xi, strict=True)], ZERO) for row in brackets]
             rates = [u + turn for u, turn in zip(rates, turned, strict=True)]  # xi_dot = dqd + C xi
         inputs, nodes = (*inputs, *xi), folded(nodes, build, at)
-    graph = _numbered(inputs, [*rates, *nodes])
+    graph = _numbered_graph(inputs, [*rates, *nodes])
     return LinearRows(graph, equations.input_names, (*xi, *system.qd, *system.tau), none)
 
 
-def _numbered(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
+def _numbered_graph(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
     return Graph(inputs, {str(k): node for k, node in enumerate(outputs)})
 
 

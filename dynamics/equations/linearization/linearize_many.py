@@ -65,7 +65,7 @@ def linearize_many(
     """
     system = as_system(model)
     found, n = linear_rows(system, require_choice("form", form, FORMS)), system.n
-    function = _compiled(found.graph)
+    function = _machine_code(found.graph)
     values = input_rows(system, found.inputs, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if values.ndim != 2:
         raise ValueError("linearize_many takes rows of states, got one state; see linearize")
@@ -80,6 +80,6 @@ def linearize_many(
 
 
 @kept_by_first
-def _compiled(graph: Graph) -> Compiled:
+def _machine_code(graph: Graph) -> Compiled:
     """The graph as machine code."""
     return cg.compile(graph)
