@@ -50,16 +50,16 @@ LAZY = {
 }
 MOST_LAZY = 10
 LINES = {  # at most; whoever makes room writes the lower number, and nobody a higher one
-    "packages": 68_000,
+    "packages": 67_624,
     "tests": 43_100,
-    "bench": 4_500,
+    "bench": 4_494,
     "pages": 5_300,
 }
 MOST_FILES = 16  # in a folder, those of its sub-folders counted
 FILES = {  # of folders that have more: these numbers may only fall
     "cgraph/autodiff": 17,
     "cgraph/codegen": 24,
-    "cgraph/program": 41,
+    "cgraph/program": 38,
     "dynamics/equations": 47,
     "dynamics/experiments": 22,
     "dynamics/multibody": 60,

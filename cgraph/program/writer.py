@@ -37,18 +37,19 @@ class Functions:
         reads: Sequence[int],
         writes: Sequence[int],
         products: Mapping[Node, Node] | None = None,
-        *,
         exact: bool = False,
+        begins: Lengths = (),
     ) -> str:
         """y = graph(x), where of its registers some, end to end, are x, and some y; a register may be both.
 
         products: see `instructions`.  exact: no product is joined with a sum.
+        begins: where the registers lie in the memory, whose address is then the function's one argument: addresses are
+        constants of the instructions. Without, each register has an argument.
         """
         arithmetic = self.arithmetic.unfused if exact else self.arithmetic
-        pointers = [f"%in{k}" for k in range(len(registers))]
-        places = [
-            _places(arithmetic.type, pointer, length) for pointer, length in zip(pointers, registers, strict=True)
-        ]
+        pointers = ["%in0"] if begins else [f"%in{k}" for k in range(len(registers))]
+        ends = [("%in0", begin) for begin in begins] or [(pointer, 0) for pointer in pointers]
+        places = [_places(arithmetic.type, *end, length) for end, length in zip(ends, registers, strict=True)]
         x, y = ([place for k in which for place in places[k]] for which in (reads, writes))
         known = set(x)
         again = {row for row, place in enumerate(y) if place in known}
@@ -56,7 +57,7 @@ class Functions:
         def text(ir: FunctionWriter, name: str) -> None:
             self._body(ir, name, graph, x, y, pointers, products=products, last=again)
 
-        key = (id(graph), registers, tuple(reads), tuple(writes), exact)
+        key = (id(graph), registers, tuple(reads), tuple(writes), exact, begins)
         return self._define(key, "call", text, arithmetic, len(pointers), 0)
 
     def map(
@@ -98,13 +99,13 @@ class Functions:
                     ir.store_at(ir.value(f"call {vector} @{gather}(ptr {ir.at(found[k], i, one)})"), brought[k])
                 sources = [brought.get(k, at if k in same else ir.at(at, i, one)) for k, at in enumerate(found)]
                 targets = [ir.at(f"%out{k}", i, one) for k in range(len(outputs))]
-                x = [place for at, length in zip(common, shared, strict=True) for place in _places(one, at, length)]
+                x = [place for at, length in zip(common, shared, strict=True) for place in _places(one, at, 0, length)]
                 for k, (at, length) in enumerate(zip(sources, inputs, strict=True)):
-                    x += _places(one, at, max(1, length // count), 0 if k in same else count)
+                    x += _places(one, at, 0, max(1, length // count), 0 if k in same else count)
                 y = [
                     place
                     for at, length in zip(targets, outputs, strict=True)
-                    for place in _places(one, at, length // count, count)
+                    for place in _places(one, at, 0, length // count, count)
                 ]
                 uniform = sum(shared) if in_vectors else 0
                 self._body(ir, name, graph, x, y, [*common, *sources, *targets], uniform=uniform)
@@ -202,9 +203,9 @@ class Functions:
         return name
 
 
-def _places(t: str, pointer: str, count: int, step: int = 1) -> list[str]:
+def _places(t: str, pointer: str, begin: int, count: int, step: int = 1) -> list[str]:
     """Places of so many numbers of a register."""
-    return [f"{t}, ptr {pointer}, i64 {k * step}" for k in range(count)]
+    return [f"{t}, ptr {pointer}, i64 {begin + k * step}" for k in range(count)]
 
 
 class Writer(FunctionWriter):
@@ -212,6 +213,7 @@ class Writer(FunctionWriter):
 
     functions: those of the module, which statements call.  size: of a number in a register, in bytes.
     pointers: {register: its address}.  before: the statement that has been written last.
+    offsets: {register: its place in %memory}, where they all lie there.  alone: ids of graphs that one statement calls.
     """
 
     def __init__(self, registers: Registers, functions: Functions) -> None:
@@ -219,6 +221,8 @@ class Writer(FunctionWriter):
         self.registers, self.functions, self.size = registers, functions, 8 * self.lanes
         self.pointers = {name: f"%r{number}" for number, name in enumerate(registers)}
         self.before: Statement | None = None
+        self.offsets: Registers = {}
+        self.alone: frozenset[int] = frozenset()
 
     def run(self, statements: Sequence[Statement]) -> None:
         """Statements, one after another."""

@@ -212,14 +212,15 @@ def lengths_of(statements: Iterable[Statement], known: Mapping[str, int]) -> dic
     one for each register, or all of the only one that is not known. Pivots are as many as a matrix has rows.
     """
     every, lengths = list(_inside(statements)), dict(known)
-    while True:
+    for _ in every:
         before = dict(lengths)
         for statement in every:
             for name, length in _told(statement, known, lengths):
                 if name not in known:
                     lengths[name] = max(length, lengths.get(name, 0))
         if lengths == before:
-            return lengths
+            break
+    return lengths
 
 
 def _inside(statements: Iterable[Statement]) -> Iterator[Statement]:

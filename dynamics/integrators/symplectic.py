@@ -186,14 +186,9 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
             turn.append(velocity(f"Q{i}", f"V{i}", f"P{i}", f"time{i}", f"W{i}"))
         body = [*_iterated(method, turn), _added("q", "V", method.w), _added("momentum", "F", method.w)]
         body += [stage_time("later", 1.0), *[settled] * (1 if graphs.quadratic else REPEATS)]
-    read = Call(graphs.momentum, ("x", "t", "p"), ("momentum",))
-    return Step(
-        {"q": n, "v": n, "failed": 1, "singular": 1},
-        [*_in_turn(composition, body), _joined(("q", "v"), (n, n))],
-        start=[_parted(("q", "v"), (n, n)), read, *[copied("v", f"V{i}") for i in stages]],
-        fixed=_fixed(method),
-        failed="failures",
-    )
+    sizes, read = {"q": n, "v": n}, Call(graphs.momentum, ("x", "t", "p"), ("momentum",))
+    start = [_parted(sizes), read, *[copied("v", f"V{i}") for i in stages]]
+    return _step(method, sizes, start, [*_in_turn(composition, body), _joined(sizes)])
 
 
 def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -> Step:
@@ -201,10 +196,9 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
     stages = range(len(method.w))
     parts = [("q", "Q", "V", method.a), ("momentum", "P", "F", method.b)][: 2 if problem.momenta else 1]
     bases, slopes = tuple([part[0] for part in parts]), [part[2] for part in parts]
-    sizes = (problem.nq, problem.size - problem.nq) if problem.momenta else (problem.size,)
-    lengths = dict(
-        zip([*bases, *[f"{name}{i}" for i in stages for name in slopes]], sizes * (1 + len(stages)), strict=True)
-    )
+    lengths = (problem.nq, problem.size - problem.nq) if problem.momenta else (problem.size,)
+    sizes = dict(zip(bases, lengths, strict=True))
+    own = {f"{slope}{i}": length for i in stages for slope, length in zip(slopes, lengths, strict=True)}
 
     def rates(at: Sequence[str], t: str, velocity: str, i: int = 0) -> Call:
         return Call(problem.rate, (*at, t, "p"), tuple([f"{name}{i}" for name in (velocity, *slopes[1:])]))
@@ -218,34 +212,25 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
             turn += [_stage(a[i], base, slope, f"{stage}{i}") for i in stages for base, stage, slope, a in parts]
             turn += [rates([f"{part[1]}{i}" for part in parts], f"time{i}", velocity, i) for i in stages]
         body = [*_iterated(method, turn), *[_added(base, slope, method.w) for base, _, slope, _ in parts]]
-    return Step(
-        {**lengths, "failed": 1},
-        [_parted(bases, sizes), *_in_turn(composition, body), _joined(bases, sizes)],
-        start=[rates("x", "t", "V"), *[copied(f"{slope}0", f"{slope}{i}") for slope in slopes for i in stages[1:]]],
-        fixed=_fixed(method),
-        failed="failures",
-    )
+    start = [rates("x", "t", "V"), *[copied(f"{slope}0", f"{slope}{i}") for slope in slopes for i in stages[1:]]]
+    return _step(method, sizes | own, start, [_parted(sizes), *_in_turn(composition, body), _joined(sizes)])
 
 
-def _fixed(method: Partitioned) -> tuple[str, ...]:
-    """Registers that the derivative of a step leaves out."""
-    sums = [*numbered("change", len(method.w)), *numbered("speed", len(method.w))]
-    return (*sums, *"q_rounding momentum_rounding singular failed failures going turns change_old".split())
+def _step(method: Partitioned, lengths: dict[str, int], start: list[Statement], body: list[Statement]) -> Step:
+    fixed = [*numbered("change", len(method.w)), *numbered("speed", len(method.w))]
+    fixed += "q_rounding momentum_rounding singular failed failures going turns change_old".split()
+    return Step({**lengths, "failed": 1, "singular": 1}, body, start=start, fixed=tuple(fixed), failed="failures")
 
 
-def _parted(registers: Sequence[str], lengths: Sequence[int]) -> Call:
-    """Registers = the numbers of x, end to end."""
-    ends = list(itertools.accumulate(lengths, initial=0))
-    return call(
-        lambda x: {name: x[begin:end] for name, (begin, end) in zip(registers, itertools.pairwise(ends), strict=True)},
-        x=ends[-1],
-    )
+def _parted(sizes: dict[str, int]) -> Call:
+    """Registers of these lengths = the numbers of x, end to end."""
+    numbers = dict(zip(sizes, itertools.pairwise(itertools.accumulate(sizes.values(), initial=0)), strict=True))
+    return call(lambda x: {name: x[begin:end] for name, (begin, end) in numbers.items()}, x=sum(sizes.values()))
 
 
-def _joined(registers: Sequence[str], lengths: Sequence[int]) -> Call:
+def _joined(sizes: dict[str, int]) -> Call:
     """x_new = the numbers of registers, end to end."""
-    sizes = dict(zip(registers, lengths, strict=True))
-    return call(lambda *parts: {"x_new": [number for part in parts for number in part]}, *registers, **sizes)
+    return call(lambda *parts: {"x_new": [number for part in parts for number in part]}, *sizes, **sizes)
 
 
 def _in_turn(composition: Composition, body: Sequence[Statement]) -> list[Statement]:

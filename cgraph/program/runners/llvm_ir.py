@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from ...codegen.arithmetic import REGISTERS, Arithmetic
@@ -10,6 +11,7 @@ from ...codegen.llvm_engine import MissingFunctionError
 from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
 from ..program import Program, whole_graph
 from ..statement import row_of
+from ..statements.call import Call
 from ..writer import Functions, Writer
 
 
@@ -94,8 +96,10 @@ def _run_function(program: Program, ir: Writer) -> list[str]:
         read; statements; done++; if (--until == 0) { until = every; record } if (stop) break
     }
     """
-    places = offsets(program.registers, ir.functions.width)
+    ir.offsets = places = offsets(program.registers, ir.functions.width)
     ir.pointers = {name: ir.at("%memory", places[name]) for name in program.registers}
+    calls = Counter([id(each.graph) for each in program.statements() if isinstance(each, Call)])
+    ir.alone = frozenset([graph for graph, count in calls.items() if count == 1])
     row, until = ir.room(1, "ptr"), ir.room(1, "i64")
     ir.store_at("%records", row, "ptr")
     ir.store_at("%every", until, "i64")

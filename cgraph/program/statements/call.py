@@ -306,8 +306,10 @@ def call_text(call: Call, writer: Writer) -> None:
     """Write as machine code."""
     registers = list(dict.fromkeys((*call.inputs, *call.outputs)))
     reads, writes = (tuple([registers.index(name) for name in names]) for names in (call.inputs, call.outputs))
-    name = writer.functions.call(call.graph, writer.lengths(registers), reads, writes, call.products, exact=call.exact)
-    writer.call(name, [writer.pointer(register) for register in registers])
+    begins = tuple([writer.offsets[name] for name in registers]) if id(call.graph) in writer.alone else ()
+    how, lengths = (call.products, call.exact, begins), writer.lengths(registers)
+    name = writer.functions.call(call.graph, lengths, reads, writes, *how)
+    writer.call(name, ["%memory"] if begins else [writer.pointer(register) for register in registers])
 
 
 def map_text(statement: Map, writer: Writer) -> None:

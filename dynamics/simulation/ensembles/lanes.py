@@ -28,7 +28,6 @@ from ..steps.step_program import StepProgram
 FEW_TRAJECTORIES = 32  # trajectories: fewer by chosen steps are done one by one before the code of lanes is made
 VECTOR = 8  # lanes, or a multiple of them, of every processor
 PASSES = 64  # of the first block, before it is known how long one takes
-ROWS = 2**22  # numbers in the rows of lanes, at most
 RESULTS = ["status", "t", "trials", "rejected", "evaluations", "at_limit", "longest_made"]
 
 Stopped = Callable[[], bool]

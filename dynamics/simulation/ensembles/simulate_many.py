@@ -193,12 +193,15 @@ def ends_of(task: Task, x: Array, p: Array, workers: Workers) -> Array:
     team, rows = checked(workers), np.empty((len(x), 1, x.shape[1]))
     with np.errstate(all="ignore"):
         found = task.run_lanes(x, p, rows, lambda: False) if team == 1 and len(x) <= task.largest else None
-    if found is None or not found[0].all() or any(found[1].get("warnings", ())):
+    whole = None
+    if found is None or not found[0].all():
         whole = _run_chunks(task, x, p, task.width(None, team), team)
-        rows = whole.rows
-        for text in doubts(whole.stats(task.options.method, 0.0)):
-            warnings.warn(text, SimulationWarning, stacklevel=3)
-    return rows[:, 0]
+    elif any(found[1].get("warnings", ())):
+        whole = Part(0, rows)
+        whole.reached(slice(None), **found[1])
+    for text in doubts(whole.stats(task.options.method, 0.0)) if whole is not None else ():
+        warnings.warn(text, SimulationWarning, stacklevel=3)
+    return rows[:, 0] if whole is None else whole.rows[:, 0]
 
 
 def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None = None) -> Part:
@@ -208,8 +211,10 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
     Raises ValueError unless all parts come.
     """
     rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
-    whole, came = Part(0, rows), dict[int, int]()  # trajectories, by the first
     chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
+    if store is None and len(chunks) == 1 and isinstance(workers, int):
+        return task.run(chunks[0], rows, lambda: False)
+    whole, came = Part(0, rows), dict[int, int]()  # trajectories, by the first
     if store is not None:
         known = {chunk.first: part for chunk in chunks if (part := store.part(chunk)) is not None}
         for part in known.values():

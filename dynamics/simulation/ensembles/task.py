@@ -22,7 +22,6 @@ from ..steps.equal_steps import EqualSteps, Numbers, even_steps
 from ..steps.step_program import StepProgram, compile_steps
 from .ensemble import COLUMNS, Part
 from .lanes import (
-    ROWS,
     VECTOR,
     Code,
     LaneRuns,
@@ -36,7 +35,8 @@ from .lanes import (
 )
 
 LARGEST_CHUNK = 256  # trajectories in a chunk one by one, unless asked for
-LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have at most `ROWS` numbers
+LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
+ROWS = 2**22  # .. so many numbers
 SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
 UNKNOWN = 16  # workers behind a map, which does not say
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together

@@ -55,7 +55,7 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -
         def run(chunk: Chunk) -> Part:
             return task.run(chunk, table[chunk.first : chunk.first + len(chunk.x)], stop.is_set)
 
-        if workers == 1 or len(chunks) <= 1:
+        if workers == 1:
             yield from map(run, chunks)
             return
         with ThreadPoolExecutor(min(workers, len(chunks))) as pool:  # which waits for its threads at any exit

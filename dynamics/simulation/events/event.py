@@ -15,7 +15,7 @@ from cgraph.extend import Builder, building, topological
 
 from ...equations.substitute import substitute
 from ...integrators import Problem, quantity, quantity_inputs, state_arguments
-from ...systems.arguments import call_user_function, node_or_number, sequence
+from ...systems.arguments import call_user_function, new_variables, node_or_number, sequence
 from ..steps.dense_output import UNIT
 from ..steps.row_values import values_of
 
@@ -202,12 +202,8 @@ def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
 
     An error passes on through the local partials, in absolute value, and each operation adds its own.
     """
-    suffix = "_error"
-    while any(f"{node.name}{suffix}" in graph.input_names for node in inputs):
-        suffix += "_"
-    errors: dict[Node, Node] = {node: cg.variable(f"{node.name}{suffix}") for node in inputs}
-    leaves = list(errors.values())
-    zero = cg.constant(0.0)
+    leaves, zero = new_variables("error", len(inputs), graph.input_names), cg.constant(0.0)
+    errors: dict[Node, Node] = dict(zip(inputs, leaves, strict=True))
     with building(Builder()):
         for node in graph.nodes:
             if node in errors:

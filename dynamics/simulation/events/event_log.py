@@ -48,11 +48,11 @@ class EventLog:
     ended: the event that has ended the run, in words.  status: why a reset has stopped it.
     parameters: of the rate, those of the block that is to come.
     restart: (t, x, x_new), the state that was reset and the one to go on from, else None.
-    said: {(number of an event, what): sentence}, once each.
+    said: {(number of an event, what): sentence}, once each.  resetting: whether there are events that reset the state.
     """
 
     def __init__(self, program: EventProgram) -> None:
-        self.program = program
+        self.program, self.resetting = program, any([event.reset is not None for event in program.events])
         self.parameters: Sequence[float] = ()
         self.ended = self.status = ""
         self.restart: tuple[float, Array, Array] | None = None
@@ -115,11 +115,16 @@ class EventLog:
         return sorted(found)
 
     def _see(self, part: StepBlock, steps: int, x: Array) -> None:
-        """The run came to x by the first steps of a part: how far its states have gone, and how many roundings old."""
+        """The run came to x by the first steps of a part: how far its states have gone, and how many roundings old.
+
+        Rates tell what a reset leaves at rest.
+        """
         self._steps += steps
-        states = np.vstack([part.x_old[:steps], x])
-        times = np.append(part.t_old[:steps], part.t_old[0] if steps == 0 else part.t[steps - 1])
-        for k, values in enumerate((states, self.program.rates(times, states, self.parameters))):
+        seen = [np.vstack([part.x_old[:steps], x])]
+        if self.resetting:
+            times = np.append(part.t_old[:steps], part.t_old[0] if steps == 0 else part.t[steps - 1])
+            seen.append(self.program.rates(times, seen[0], self.parameters))
+        for k, values in enumerate(seen):
             values = np.where(np.isfinite(values), values, 0.0)
             self._gone[k] += np.abs(np.diff(values, axis=0)).sum(axis=0)
             np.fmax(self._gone[k], np.abs(values).max(axis=0), out=self._gone[k])

@@ -182,8 +182,7 @@ def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -
     """
 
     def shorter(fine: Node, left: Node, reach: Node) -> Values:
-        looking = (1.0 - fine) * (left > 1.0)
-        return {"left": left - 1.0, "looking": looking, "reach": cg.where(fine, reach, 0.25 * reach)}
+        return {"left": (1.0 - fine) * (left - 1.0), "reach": cg.where(fine, reach, 0.25 * reach)}
 
     def seen(jumps: Node, first: Node, reach: Node, length: Node, longest_step: Node, least: Node) -> Values:
         h_try = _first_try(length, longest_step, least)
@@ -208,8 +207,8 @@ def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -
         "look",
         (
             _largest(kinds, "x_start", "kind"),
-            call(lambda h_look: {"reach": h_look, "left": HALVINGS, "looking": 1.0}),
-            While("looking", (*euler, call(shorter))),
+            call(lambda h_look: {"reach": h_look, "left": HALVINGS}),
+            While("left", (*euler, call(shorter))),
             each(lambda fine, size_ahead, x_start: {"size": cg.where(fine, size_ahead, _size(x_start))}),
             *tolerance,
             call(seen),

@@ -184,11 +184,6 @@ def test_a_run_goes_on_where_the_last_one_ended(backend: str) -> None:
     for passes, end in ((2, 3.0), (100, 5.0)):
         advance(passes)
         assert run.read(memory, "k").tolist() == [end]
-    with pytest.raises(cg.GraphError, match="a memory must be contiguous"):
-        run.advancing(memory[:1].astype(np.float32))
-    fed = runner(Program({"k": 1, "done": 1}, count, ["k"], feed=["k"]), backend)
-    with pytest.raises(cg.GraphError, match="takes no feed"):
-        fed.advancing(fed.memory({}))
     graph = spring()
     program = Program({"c": 2, "h": 1}, [Call(graph, ("c", "h"), ("c",))], record=["c"])
     run = runner(program, backend)
@@ -361,3 +356,19 @@ def test_a_batch_records_what_a_pass_records_from_every_value(backend):
         runner(Program({"x": 2, "u": 2, "z": 2, "s": 1}, body[1:2], record=["z"]), backend).batch("u", values)
     with pytest.raises(cg.GraphError, match=r"shape \(N, 2\)"):
         run.batch("x", values[0])
+
+
+def test_a_listing_tells_loops_branches_and_what_a_statement_reads_before_it_writes() -> None:
+    a, b = cg.variables("a b")
+    swap, long = cg.Graph([a, b], {"p": b, "q": a}), cg.Graph([a], {"o": sum([cg.sin(a * k) for k in range(1, 9)])})
+    turn = (Call(swap, ("x", "y"), ("x", "y")), Call(ONE, ("n",), ("n",)))
+    body = [While("n", (If("x", turn, (Map(long, ("v",), ("v",)),)),)), Factor("m", "v")]
+    program = Program({"x": 1, "y": 1, "n": 1, "v": 2, "m": 4}, body, ["x"], record_if="y", stop="n")
+    assert program.listing({"waves": long}).splitlines()[5:-2] == [
+        "        if x > 0:",
+        "            x, y = f1(x, y)  # 0 operations",
+        "            n = -n",
+        "        else:",
+        "            v = waves(v) for each element  # 24 operations",
+        "    m, v = Factor(m)",
+    ]

@@ -12,6 +12,7 @@ from pytest import approx, mark, raises
 
 import dynamics as dyn
 from dynamics import METHODS, System, as_system, simulate_many
+from dynamics.simulation.ensembles import task
 from dynamics.simulation.steps.equal_steps import even_steps
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import oscillator, random_arm
@@ -78,10 +79,17 @@ def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None
 
 
 def test_many_steps_come_in_many_blocks() -> None:
-    whole = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
-    with patch.multiple("dynamics.simulation.ensembles.lanes", ROWS=200, PASSES=3):
-        blocks = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
+    """Also of a force with a kink, across which all steps are looked at."""
+    bent = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - abs(q[0]) - 0.1 * q[0], ["x"])
+    runs = [(*arms(9), times) for times in (None, [0.05, 0.2], [0.15, 0.2])] + [(bent, np.ones((9, 1)), [-9.0], [0.2])]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.SimulationWarning)
+        whole = [simulate_many(*run, 0.2, "rk4", t_eval=times) for *run, times in runs]
+        with patch.multiple("dynamics.simulation.ensembles.lanes", PASSES=3), patch.object(task, "ROWS", 200):
+            blocks = [simulate_many(*run, 0.2, "rk4", t_eval=times) for *run, times in runs]
     assert all(map(same, whole, blocks))
+    for one, other in zip(whole, blocks, strict=True):
+        np.testing.assert_array_equal(one.stats.error, other.stats.error)
 
 
 # What can go wrong on the way
