@@ -264,11 +264,10 @@ class Tape:
 
 def run_passes(ready: Runner, memory: Array, passes: int, every: int, feed: Array) -> Array:
     """The rows, (passes, width, N), of passes of N memories side by side."""
-    shape = passes // every, ready.program.width, memory.shape[1]
-    if memory.shape[1] == 1:
-        return ready.run(memory[:, 0], passes, every, feed[:, :, 0]).rows.reshape(shape)
+    one, shape = memory.shape[1] == 1, (passes // every, ready.program.width, memory.shape[1])
     with np.errstate(all="ignore"):
-        return ready.run_many(memory, passes, every, feed).rows.reshape(shape)
+        record = ready.run(memory[:, 0] if one else memory, passes, every, feed[:, :, 0] if one else feed)
+    return record.rows.reshape(shape)
 
 
 def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:

@@ -298,12 +298,8 @@ def loss_graph(problem: Problem, node: Node) -> Graph:
     """The loss over the states, t and parameters; the same object for an equal one."""
     order = topological([node])
     places = {each: k for k, each in enumerate(order)}
-    key: list[object] = []  # in a third of the time of a hash
-    for each in order:
-        if each.args:
-            key.append((each.op.name, *[places[arg] for arg in each.args]))
-        else:
-            key.append(each.name if each.value is None else float(each.value).hex())  # 0.0 and -0.0 stay apart
+    leaves = [each.name if each.value is None else float(each.value).hex() for each in order]  # 0.0 and -0.0 apart
+    key = [(each.op.name, leaf, *[places[arg] for arg in each.args]) for each, leaf in zip(order, leaves, strict=True)]
     return _bound(_Quantity(problem, tuple(key), node))
 
 
