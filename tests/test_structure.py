@@ -50,20 +50,20 @@ LAZY = {
 }
 MOST_LAZY = 10
 LINES = {  # at most; whoever makes room writes the lower number, and nobody a higher one
-    "packages": 67_624,
-    "tests": 43_100,
-    "bench": 4_494,
-    "pages": 5_300,
+    "packages": 65_885,
+    "tests": 43_072,
+    "bench": 4_489,
+    "pages": 5_297,
 }
 MOST_FILES = 16  # in a folder, those of its sub-folders counted
 FILES = {  # of folders that have more: these numbers may only fall
     "cgraph/autodiff": 17,
     "cgraph/codegen": 24,
-    "cgraph/program": 38,
+    "cgraph/program": 31,
     "dynamics/equations": 47,
     "dynamics/experiments": 22,
     "dynamics/multibody": 60,
-    "dynamics/simulation": 51,
+    "dynamics/simulation": 41,
     "viz/commands": 22,
 }
 FACES = ("cgraph.extend", "cgraph._shared")  # of cgraph, besides itself
