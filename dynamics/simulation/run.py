@@ -79,21 +79,20 @@ class Run(HoldsNodes):
         varied: tuple[str, ...],
         parameters: Mapping[str, Any] | None = None,
     ) -> None:
-        self._fixed = model, options, tau, events, form, dense_output, varied
-        self._options, self._events, self._varied, self._parameters = options, events, varied, parameters
-        self._form, self._between = form, bool(events) or dense_output
+        self._model, self._tau, self._events, self._parameters = model, tau, events, parameters
+        self._options, self._form, self._dense_output, self._varied = options, form, dense_output, varied
 
     @cached_property
     def applied(self) -> Applied:
         """The equations of the model, and the force that is applied to it."""
-        return with_applied(self._fixed[0], self._fixed[2], self._values)
+        return with_applied(self._model, self._tau, self._values)
 
     @cached_property
     def _values(self) -> Mapping[str, Any] | None:
         """Values of parameters, those that stay open included, so that a controller knows its own."""
         if not (self._varied and isinstance(self._parameters, Mapping | None)):
             return self._parameters
-        own = as_equations(self._fixed[0]).parameters
+        own = as_equations(self._model).parameters
         return {name: own.get(name, 0.0) for name in self._varied} | dict(self._parameters or {})
 
     @property
@@ -292,15 +291,15 @@ class Run(HoldsNodes):
             )
         x = bound._checked_start(q, qd, t0, t0 + 1.0 if t_end is None else t_end, parameters)
         stepper = bound._unrecorded()
-        stepper.set_parameters(bound._given(parameters))
+        stepper.set_parameters(bound._open_values(parameters))
         return MotionSteps(stepper, x, float(t0), t_end)
 
     def compile(self) -> None:
         """Make the machine code of an end, and of rows at steps, with the model's own values of parameters."""
-        if self._alone is None:
+        if self._memory is None:
             self._stepper(self._options, [0.0] * len(self.problem.parameters), self._hold(self._options))
 
-    def _given(self, parameters: Mapping[str, Any] | None) -> list[float]:
+    def _open_values(self, parameters: Mapping[str, Any] | None) -> list[float]:
         """Values of the inputs of the problem that are not built in, with these of parameters."""
         if not self._varied:
             return []
@@ -313,7 +312,7 @@ class Run(HoldsNodes):
 
     def _require_given(self, parameters: Mapping[str, Any] | None) -> None:
         """Raises ValueError where a parameter of the controller has no value."""
-        own = as_equations(self._fixed[0]).parameters
+        own = as_equations(self._model).parameters
         if missing := [name for name in self._varied if name not in own and name not in (parameters or {})]:
             raise ValueError(f"parameter {missing[0]!r} of the controller needs a value")
 
@@ -335,7 +334,8 @@ class Run(HoldsNodes):
             return self
         key = _values_key(parameters)
         if (found := self._runs.get(key)) is None:
-            found = Run(*self._fixed, parameters)
+            kept = self._model, self._options, self._tau, self._events, self._form, self._dense_output, self._varied
+            found = Run(*kept, parameters)
             if len(self._runs) >= KEPT_PARAMETERS:
                 self._runs.pop(next(iter(self._runs)), None)
             self._runs[key] = found
@@ -359,11 +359,10 @@ class Run(HoldsNodes):
 
     def _unrecorded(self) -> Stepper:
         """A memory in which motions run by steps alone."""
-        zeros = [0.0] * len(self.problem.parameters)
-        return stepper_of(self.stepped, self._options, zeros, events=None, between=False)
+        return stepper_of(self.stepped, self._options, [0.0] * len(self.problem.parameters), events=None, between=False)
 
     @property
-    def _alone(self) -> Stepper | None:
+    def _memory(self) -> Stepper | None:
         """The memory of this thread; None where an end needs more than steps."""
         try:
             found: Stepper | None = self._memories.made
@@ -383,7 +382,7 @@ class Run(HoldsNodes):
         parameters: Mapping[str, float] | None,
     ) -> MotionEnd:
         """As `end`, with parameters built in."""
-        alone = self._alone
+        alone = self._memory
         if alone is None:
             run = self._trajectory(q, qd, self._options.over(t0, t_end, [t_end]), parameters)
             if not run.success:
@@ -391,10 +390,10 @@ class Run(HoldsNodes):
             return MotionEnd(float(run.t[-1]), run.q[-1], run.qd[-1])
         timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
         if self._varied:
-            alone.set_parameters(self._given(parameters))
+            alone.set_parameters(self._open_values(parameters))
         q, qd = floats(q), floats(qd)
         plain = timely and self._is_plain and type(q) is np.ndarray and (qd is None or type(qd) is np.ndarray)
-        if not (plain and alone.begins(q, qd, t0, t_end)):  # see what is wrong
+        if not (plain and alone.has_begun(q, qd, t0, t_end)):  # see what is wrong
             alone.begin(self._checked_start(q, qd, t0, t_end, parameters), float(t0), float(t_end))
         alone.to_end()
         if alone.status:
@@ -411,7 +410,7 @@ class Run(HoldsNodes):
     ) -> Array:
         """The state (m,) in which a motion starts, all arguments checked."""
         self._options.over(t0, t_end, None).check(self.problem.states)
-        return self._start(q, qd, t0, self._given(parameters))
+        return self._start(q, qd, t0, self._open_values(parameters))
 
     def _hold(self, options: RunOptions) -> Hold | None:
         """The forces that a sampled controller is to hold. Raises ValueError for a motion that it cannot control."""
@@ -424,13 +423,15 @@ class Run(HoldsNodes):
         return Hold(controller, self.model.velocities, self.stepped.nq, options.t0, observed)
 
     def _stepper(self, options: RunOptions, p: Sequence[float], hold: Hold | None = None) -> Stepper:
-        return stepper_of(self.stepped, options, p, hold, events=self.watched, between=self._between)
+        return stepper_of(
+            self.stepped, options, p, hold, events=self.watched, between=bool(self._events) or self._dense_output
+        )
 
     def _trajectory(
         self, q: ArrayLike, qd: ArrayLike | None, options: RunOptions, parameters: Mapping[str, float] | None
     ) -> Trajectory:
         """The motion over the span of options, with parameters built in. Raises InterruptedMotion by Ctrl-C."""
-        p, stepped = self._given(parameters), self.stepped
+        p, stepped = self._open_values(parameters), self.stepped
         start, values = self._start(q, qd, options.t0, p), p or 0.0
         options.check(self.problem.states)
         options.check_room(len(start))
@@ -440,7 +441,7 @@ class Run(HoldsNodes):
         run, x = self._stepper(options, p, hold), converted(stepped.momentum, options.t0, start, values)
 
         # Integrate, noting rows and events
-        steps: list[StepBlock] | None = [] if self._fixed[5] else None
+        steps: list[StepBlock] | None = [] if self._dense_output else None
         again = partial(self._stepper, p=p) if hold is None else None
         with Progress("simulate", options.length, options.progress) as report:
             stats, recorder = outcome(run, x, options, again, steps, report)

@@ -108,8 +108,8 @@ class Stepper(ABC):
         self.x[:] = x
         self._begin(t0, t_end)
 
-    def begins(self, q: object, qd: object, t0: float, t_end: float) -> bool:
-        """Start anew from q and qd, if they are arrays of float64 that fit and finite. qd: None where q is all."""
+    def has_begun(self, q: object, qd: object, t0: float, t_end: float) -> bool:
+        """Start anew from q and qd; whether they are arrays of float64 that fit and finite. qd: None where q is all."""
         self._numbers[:], self.status = self._zero, ""
         try:  # which compares shapes and types, quicker than to look at them first
             self._halves[0][:] = q
@@ -124,7 +124,8 @@ class Stepper(ABC):
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time. A reset by an event is a step of no length."""
-        t, t_end, log = self.options.t0, self.options.t_end, self.log
+        t, t_end = self.options.t0, self.options.t_end
+        log = self.log = None if self.log is None else self.log.anew()
         self._clear()
         while True:
             self.begin(x, t, t_end)
@@ -184,7 +185,7 @@ class Stepper(ABC):
 
     @cached_property
     def _unrecorded(self) -> Callable[[int], None]:
-        return self.runner.advancing(self._memory)
+        return self.runner.bind(self._memory)
 
     def _go(self, most: int = 2**62) -> None:
         """Make so many passes, or until the program stops, in pieces of bounded time: Ctrl-C ends them in between."""
@@ -231,8 +232,7 @@ class Stepper(ABC):
         self.largest = max(self.largest, longest)
 
     def _too_many(self) -> str:
-        most = self.options.max_steps
-        return f"stopped at t = {self.t:.6g} s after max_steps = {most:g} steps"
+        return f"stopped at t = {self.t:.6g} s after max_steps = {self.options.max_steps:g} steps"
 
     def _number(self, name: str) -> float:
         return float(self._numbers[self._at[name]])
@@ -266,10 +266,9 @@ class EqualStepper(Stepper):
         return other
 
     def again(self, dt: float) -> EqualStepper:
-        """The stepper of the same run by steps of at most dt, which meet its end alone."""
+        """The stepper of the same run, without a controller, by steps of at most dt, which meet its end alone."""
         options = replace(self.options, dt=dt, t_eval=None, max_steps=math.inf)
-        log = None if self.log is None else self.log.anew()
-        return EqualStepper(self.compiled, options, self.parameters, self.control, log, self.stopped)
+        return EqualStepper(self.compiled, options, self.parameters, log=self.log, stopped=self.stopped)
 
     def _recorded(self, t0: float, t_end: float) -> Iterator[StepBlock]:
         instants = [t0, *[t for t in self.options.instants if self.options.direction * (t - t0) > 0.0]]

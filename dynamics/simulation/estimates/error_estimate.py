@@ -238,7 +238,7 @@ class _Whole:
 
     def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
         self._run, self._x, stretches = run, x, equal_steps(options.instants, options.step)
-        self._resetting = run.log is not None and any([event.reset for event in run.log.program.events])
+        self._resetting = run.log is not None and run.log.resetting
         if self._resetting:
             stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
         self._beside = runs_beside(stretches, run.program.order)
