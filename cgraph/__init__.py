@@ -66,7 +66,6 @@ if TYPE_CHECKING:
         where as where,
     )
     from .program.functions.compiled import Compiled as Compiled, compile as compile
-    from .program.loop import loop as loop
     from .simplification.simplify import simplify as simplify, specialize as specialize
     from .util.caches import clear_caches as clear_caches
     from .writing.html import html as html

@@ -26,6 +26,7 @@ from dynamics.scenes import Scene
 from dynamics.simulation.simulate import prepare
 from dynamics.systems.arguments import TIME
 from tests.javascript import stepped_by_js
+from tests.repeated import repeated
 
 STEP = 2.0**-10  # s: with it times are exact
 STEPS, EVERY = 1000, 100  # steps, and of how many the last state counts
@@ -43,7 +44,7 @@ class Motion:
         self.states = len(self.rate.outputs)
         self.step, self.carry = _step(self.rate)
         self.calls_library = any([columns(node.op).calls_library for node in self.rate.nodes if node.args])
-        self.loop = cg.loop(self.step, self.carry, fma=False)
+        self.loop = repeated(self.step, self.carry, fma=False)
 
     def digests(self) -> dict[str, str]:
         """{way: digest} of all ways that there are here; that of JavaScript apart, where sines are its own."""
@@ -77,7 +78,7 @@ class Motion:
         """Nine starts side by side, the motion's own the fifth."""
         starts = np.repeat(np.array(self.start)[:, None], 9, axis=1)
         starts[: self.states] += 0.01 * np.arange(-4, 5)
-        return digest(self.loop.batch(starts, STEPS, EVERY)[:, : self.states, 4])
+        return digest(self.loop(starts, STEPS, EVERY)[:, : self.states, 4])
 
     def _threads(self) -> str:
         with ThreadPoolExecutor(4) as pool:
@@ -133,7 +134,7 @@ def rate_and_start(scene: Scene) -> tuple[Graph, list[float]]:
 
 def rows_of(step: Graph, carry: dict[str, str], start: list[float], states: int, backend: str) -> Array:
     """The states at every EVERY-th step."""
-    return cg.loop(step, carry, backend, fma=False)(start, STEPS, EVERY)[:, :states]
+    return repeated(step, carry, backend, fma=False)(start, STEPS, EVERY)[:, :states]
 
 
 def other_process() -> None:

@@ -100,7 +100,6 @@ def lagrangian(q, qd, t):
 
 GRAPH, SQUARES = cg.Graph([X, Y], {"r": X * Y}), cg.Graph([X, Y], {"r": X * X + Y * Y})
 HALVE = cg.Graph([X], {"next": 0.5 * X})
-LOOP = cg.loop(HALVE, {"x": "next"}, "python")
 DECAY = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
 MOTION = dyn.prepare(ARM, "rk4", dt=0.01, backend="python", estimate_error=False)
 ROBOT = """<robot name="r"><link name="world"/><link name="b"><inertial><mass value="1"/>
@@ -150,7 +149,6 @@ CALLS = {
     "cg.lint": call(
         cg.lint, GRAPH, independent=(), depends=None, box=None, at=None, digits=4.0, function="f", names=None
     ),
-    "cg.loop": call(cg.loop, HALVE, {"x": "next"}, "python", fast=False, fma=True),
     "cg.specialize": call(cg.specialize, GRAPH, {"x": 1.0}, outputs=None),
     "cg.tag": call(tagged, "a"),
     "cg.to_c": call(cg.to_c, GRAPH, "f", None, dtype="float64", box=None, time="t", fma=False, names=None),
@@ -178,8 +176,6 @@ CALLS = {
     "cg.Compiled.bind_jacobian": call(
         cg.compile(GRAPH, "python").bind_jacobian, np.ones(2), np.ones((1, 2)), wrt=None, threads=1
     ),
-    "cg.Loop()": call(LOOP, [1.0], 2, 1),
-    "cg.Loop.batch": call(LOOP.batch, [[1.0]], 2, 1),
     "cg.Comparison.classes": call(cg.compare(GRAPH, SQUARES).classes, "left"),
     "cg.CSource.write": call(cg.to_c(GRAPH).write, "."),
     **{f"dyn.{name}": call(getattr(dyn, name), ARM) for name in MODEL_ALONE.split()},
@@ -604,7 +600,6 @@ GRAPH_FIRST = [
     (cg.jacobian, ()),
     (cg.jvp, ()),
     (cg.lint, ()),
-    (cg.loop, ({},)),
     (cg.simplify, ()),
     (cg.sparsity, ()),
     (cg.specialize, ({},)),
@@ -649,7 +644,7 @@ CASES = {
         "mass must be finite",
     ),
     "info of no coordinate": (lambda: dyn.raise_if_singular(ARM, 7.0), "from 1 to 1 for a coordinate, got 7"),
-    "rows without room": (lambda: LOOP.batch([[1.0]], 10**12), "do not fit in memory"),
+    "rows without room": (lambda: RUNNER.run(np.ones((1, 1)), 10**12), "do not fit in memory"),
     "half a link": (lambda: dyn.scenes.load("chain", n=2.5), "at least one link, got 2.5"),
     "kind of a joint": (lambda: dyn.Joint("cogwheel"), "must be one of ball, fixed, free, free (body axes), "),
     "start too long": (lambda: dyn.scenes.Scene("s", "", ARM, (0.0, 0.0), (0.0,), 1.0), "q needs 1 finite numbers"),

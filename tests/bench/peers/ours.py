@@ -24,7 +24,7 @@ from tests.bench.peers.task_graphs import carried, step_graph, task_graph
 
 
 class Ours(Peer):
-    """Our graph, compiled by LLVM: the calls `bind`, `cg.loop` and `batch`."""
+    """Our graph, compiled by LLVM: the calls `bind`, `run` and `batch`."""
 
     @kept_by_first
     def graph(self, task: str) -> Graph:
@@ -51,8 +51,10 @@ class Ours(Peer):
         graph, points = self.graph(task), self.case.points(task)
         size = len(graph.nodes)
         if mode == "loop":
-            loop, x = cg.loop(*carried(self.case, task, graph)), self.case.point(task)
-            return TimedTask(lambda: loop(x, PASSES, PASSES), lambda rows: rows[-1], size)
+            step = Call(carried(self.case, task, graph), ("x",), ("x",))
+            ready, x = runner(Program({"x": len(graph.inputs)}, [step], ["x"])), self.case.point(task)
+            memory = ready.memory({"x": x})
+            return TimedTask(lambda: ready.run(memory.copy(), PASSES, PASSES).rows, lambda rows: rows[-1], size)
         function = self.function(task)
         if mode == "batch":
             return TimedTask(lambda: function.batch(points), np.asarray, size)

@@ -52,12 +52,10 @@ def step_graph(rate: Graph) -> Graph:
     return cg.simplify(Graph(x, {f"{node.name}_next": y for node, y in zip(x, after, strict=False)}))
 
 
-def carried(case: PeerModel, task: str, graph: Graph) -> tuple[Graph, dict[str, str]]:
-    """One pass of a loop over a task, and what its inputs become: the state after the step, or a nudged input."""
+def carried(case: PeerModel, task: str, graph: Graph) -> Graph:
+    """What the inputs of a task become in one pass of a loop: the state after the step, or a nudged input."""
     if task == "rk4":
-        return graph, dict(zip(graph.input_names, graph.outputs, strict=True))
+        return graph
     results = list(graph.outputs.values())
     nudged = [x + NUDGE * results[i] for x, i in zip(graph.inputs, case.nudges(task), strict=True)]
-    names = [f"{node.name}_next" for node in graph.inputs]
-    moved = Graph(graph.inputs, dict(zip(names, nudged, strict=True)))
-    return moved, dict(zip(moved.input_names, names, strict=True))
+    return Graph(graph.inputs, {f"{node.name}_next": after for node, after in zip(graph.inputs, nudged, strict=True)})

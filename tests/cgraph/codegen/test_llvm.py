@@ -17,6 +17,7 @@ from cgraph.operations.operation import OPS
 from cgraph.program.functions import compiled as functions
 from tests.cgraph.engines import evaluated, graph_of, points_of
 from tests.each_row import each_row
+from tests.repeated import repeated
 from tests.strategies import cases, examples
 from tests.ulps import same, ulps_apart
 
@@ -93,8 +94,8 @@ def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch
 
     def results():
         function = cg.compile(graph, "llvm", fma=fma)
-        repeated = cg.loop(graph, carried, "llvm", fma=fma)(points[:, 0], 3)
-        return [function(points[:, 0]), function.batch(points), repeated], function
+        rows = repeated(graph, carried, "llvm", fma=fma)(points[:, 0], 3)
+        return [function(points[:, 0]), function.batch(points), rows], function
 
     whole, function = results()
     assert "@part1" not in function.batch_source()

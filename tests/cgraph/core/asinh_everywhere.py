@@ -22,6 +22,7 @@ from cgraph.extend import OPS
 from tests.cgraph.engines import RUNNERS
 from tests.javascript import evaluated_by_js
 from tests.page_script import run_script
+from tests.repeated import repeated
 from tests.viz.typed.typed_script import run_typed
 from viz.inspector.content import State, Version
 from viz.inspector.record import record
@@ -47,8 +48,7 @@ def test_the_ufunc_and_a_name_make_the_node():
 
 @pytest.mark.parametrize("backend", RUNNERS)
 def test_in_a_native_loop(backend):
-    repeated = cg.loop(GRAPH, {"x": "y"}, backend)
-    assert repeated([512.0], 2)[-1] == pytest.approx([exact(exact(512.0))], rel=SEVERAL)
+    assert repeated(GRAPH, {"x": "y"}, backend)([512.0], 2)[-1] == pytest.approx([exact(exact(512.0))], rel=SEVERAL)
 
 
 def test_javascript_has_it_in_math():

@@ -1,4 +1,4 @@
-"""Programs and loops: machine code and Python do the same, and what they do is right."""
+"""Programs: machine code and Python do the same, and what they do is right."""
 
 import gc
 import itertools
@@ -13,6 +13,7 @@ import cgraph as cg
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Sum, While, runner
 from cgraph.program.statements.memory import Scatter
 from tests.each_row import each_row
+from tests.repeated import repeated
 from tests.strategies import examples
 from tests.tolerances import LONG_SUM
 
@@ -30,16 +31,16 @@ def test_a_loop_is_the_graph_again_and_again(backend: str) -> None:
         after = graph.evaluate(state)
         state |= {"x": after["x_next"], "v": after["v_next"]}
         rows.append([state["x"], state["v"]])
-    run = cg.loop(graph, {"x": "x_next", "v": "v_next"}, backend, fma=False)
+    run = repeated(graph, {"x": "x_next", "v": "v_next"}, backend, fma=False)
     assert run([1.0, 0.0, 0.01], 30).tolist() == rows
     assert run([1.0, 0.0, 0.01], 30, every=7).tolist() == rows[6::7]
     assert run([1.0, 0.0, 0.01], 0).shape == (0, 2)
 
 
 def test_loops_side_by_side_are_the_loops_one_by_one(backend: str) -> None:
-    run = cg.loop(spring(), {"v": "v_next", "x": "x_next"}, backend, fma=False)
+    run = repeated(spring(), {"v": "v_next", "x": "x_next"}, backend, fma=False)
     starts = np.random.default_rng(0).normal(size=(3, 21))
-    together = run.batch(starts, 12, every=5)
+    together = run(starts, 12, every=5)
     assert together.shape == (2, 2, 21)
     for k, start in enumerate(starts.T):
         assert together[:, :, k].tolist() == run(start, 12, every=5).tolist()
@@ -72,21 +73,6 @@ def test_a_bound_run_needs_memory_that_fits(backend: str) -> None:
     fed = runner(Program({"x": 1}, body, record=["x"], feed=["x"]), backend)
     with pytest.raises(cg.GraphError, match="takes no feed"):
         fed.bind(fed.memory({}), np.empty((1, 1)))
-
-
-def test_what_does_not_change_is_computed_before_the_first_pass(backend: str) -> None:
-    x, k, taken, last = cg.variables("x k invariant0 last")
-    graph = cg.Graph([last, k, x, taken], {"next": x * cg.exp(-k) + cg.sin(k) * taken + last, "same": cg.sqrt(k)})
-    run = cg.loop(graph, {"x": "next"}, backend, fma=False)
-    assert run.invariants is not None
-    assert [len(run.invariants.outputs), run.invariants.input_names] == [2, ("k", "invariant0")]
-    values = [0.25, 0.7, 1.0, 2.0]  # of `last` alone nothing can be computed before
-    expected = 1.0
-    for _ in range(3):
-        expected = graph.evaluate({"last": 0.25, "k": 0.7, "x": expected, "invariant0": 2.0})["next"]
-    assert run(values, 3)[-1, 0] == expected
-    assert run.batch(np.array([values] * 5).T, 3)[-1, 0].tolist() == [expected] * 5
-    assert cg.loop(spring(), {"x": "x_next", "v": "v_next"}, backend).invariants is None
 
 
 def test_registers_that_are_read_and_written(backend: str) -> None:
@@ -287,25 +273,14 @@ def test_wrong_use_of_a_runner(backend: str) -> None:
         alone.run(np.zeros((1, 3)), 1)
 
 
-def test_wrong_use_of_a_loop() -> None:
-    graph = spring()
-    with pytest.raises(cg.GraphError, match="no input 'z'"):
-        cg.loop(graph, {"z": "x_next"})
-    with pytest.raises(cg.GraphError, match="no output y"):
-        cg.loop(graph, {"x": "y"})
-    with pytest.raises(cg.GraphError, match="at least one input"):
-        cg.loop(graph, {})
-    with pytest.raises(ValueError, match="backend must be one of auto, python, llvm, got 'gpu'"):
-        cg.loop(graph, {"x": "x_next"}, "gpu")
-    with pytest.raises(cg.GraphError, match=r"x must have shape \(3,\)"):
-        cg.loop(graph, {"x": "x_next"})([1.0], 3)
-
-
 def test_code_in_a_cycle_of_garbage_is_let_go_in_order() -> None:
     """Python ends the objects of a cycle in any order; LLVM's context must outlive what was made in it."""
     pytest.importorskip("llvmlite")
     for _ in range(6):
-        held: list[object] = [cg.compile(ONE, "llvm"), cg.loop(spring(), {"x": "x_next"}, "llvm")]
+        held: list[object] = [
+            cg.compile(ONE, "llvm"),
+            runner(Program({"x": 1}, [Call(ONE, ("x",), ("x",))], ["x"]), "llvm"),
+        ]
         held.append(held)
         del held
         gc.collect()

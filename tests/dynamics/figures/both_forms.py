@@ -27,6 +27,7 @@ from dynamics.experiments.timing import Timed, in_turns
 from dynamics.systems.model import Model, as_system
 from tests.bench.speed.scenes import SCENES, chain
 from tests.bench.tables import digits
+from tests.repeated import repeated
 
 ROUNDS = 15  # of all forms in turn; the fastest counts
 SECONDS = 0.02  # of a round
@@ -72,7 +73,8 @@ def looped(graph: Graph) -> Way:
     """A loop of explicit Euler's steps."""
     state = graph.inputs[: len(graph.outputs)]
     moved = {f"{node.name}_next": node + STEP * rate for node, rate in zip(state, graph.outputs.values(), strict=True)}
-    loop, x = cg.loop(Graph(graph.inputs, moved), {str(n.name): f"{n.name}_next" for n in state}), _point(graph)
+    names, x = {str(node.name): f"{node.name}_next" for node in state}, _point(graph)
+    loop = repeated(Graph(graph.inputs, moved), names)
     return lambda: loop(x, PASSES, PASSES), PASSES
 
 
