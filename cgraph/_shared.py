@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from .operations.operation import columns as columns
     from .program.derivatives.jvp import Passes as Passes
     from .program.derivatives.transpose import (
-        TURNS as TURNS,
         Along as Along,
         Tape as Tape,
         adjoint as adjoint,

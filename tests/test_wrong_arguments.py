@@ -370,14 +370,9 @@ def registered_statement(row):
 CALLS |= {
     "extend.Call": call(a_program_of(extend.Call), HALVE, ("x",), ("y",)),
     "extend.FixedPoint": call(a_program_of(extend.FixedPoint), "x", (HALF,)),
-    "extend.Pop": call(a_program_of(extend.Pop), "x", "y", ("z",)),
-    "extend.Push": call(a_program_of(extend.Push), "x", "y", ("z",)),
-    "extend.Take": call(a_program_of(extend.Take), "x", "y", (0,)),
     "extend.many": call(extend.many, PROGRAM),
     "extend.program_jvp": call(extend.program_jvp, PROGRAM, [], constant=[]),
-    "extend.program_vjp": call(
-        extend.program_vjp, PROGRAM, ["x"], [], constant=[], turns=4, checkpoints=0, backend="python"
-    ),
+    "extend.program_vjp": call(extend.program_vjp, PROGRAM, ["x"], [], constant=[], checkpoints=0, backend="python"),
     "extend.register_statement": call(registered_statement, extend.STATEMENTS[extend.Call]),
     "extend.Factor": call(a_program_of(extend.Factor), "x", "y"),
     "extend.added": call(a_program_of(extend.added), "x", "y", "z"),

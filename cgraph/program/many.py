@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 
@@ -13,7 +12,6 @@ from .program import Program, live_registers, outliving
 from .statement import Statement, reads_and_writes, row_of
 from .statements.call import Call, Map, copied
 from .statements.control import FixedPoint, If, While
-from .statements.memory import Push
 
 
 def many(program: Program) -> Program:
@@ -118,20 +116,9 @@ def masked_while(statement: While | FixedPoint, masked: Masked) -> None:
     masked.add(While(going, (*turn, Call(_GOING_IN_MASK, (statement.register, going), (going,)))))
 
 
-def masked_push(push: Push, masked: Masked) -> None:
-    """Push in the lanes of the mask: in others the count is infinite meanwhile, so that nothing is put on the stack."""
-    if not masked.mask:
-        masked.add(push)
-        return
-    count = masked.register("count")
-    masked.add(Map(_COUNT, (*masked.mask, push.count), (count,)), replace(push, count=count))
-    masked.add(Map(_CHOSEN, (*masked.mask, count, push.count), (push.count,)))
-
-
 _C, _MASK, _NEW, _OLD = variables("c mask new old")
 _ON = _C > 0.0  # where NaN is not
 _CHOSEN = Graph([_MASK, _NEW, _OLD], {"chosen": where(_MASK, _NEW, _OLD)})
-_COUNT = Graph([_MASK, _OLD], {"count": where(_MASK, _OLD, math.inf)})
 _GOING = Graph([_C], {"going": _ON})
 _GOING_IN_MASK = Graph([_C, _MASK], {"going": where(_ON, _MASK, 0.0)})
 _WAYS = Graph([_C], {"on": _ON, "off": where(_ON, 0.0, 1.0)})

@@ -48,7 +48,6 @@ class StatementRow:
     assign: Callable[..., Any] | None = None  # (statement, assigned): its assignment, which bodies need
     jvp: Rule | None = None  # (assignment, tangent): adds the statements that push tangents on
     transpose: Rule | None = None  # (assignment, adjoint): adds those that pull cotangents back
-    reruns: bool = False  # whether what `jvp` adds computes the values too
 
 
 STATEMENTS: dict[type[Statement], StatementRow] = {}  # filled by table.py

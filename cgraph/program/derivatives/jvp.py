@@ -1,11 +1,11 @@
-"""Tangents: programs that push x_dot to J x_dot through any number of passes; and the single assignment behind them."""
+"""Single assignment of programs, and tangents: programs that push x_dot to J x_dot through any number of passes."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from ...autodiff.products import jvp
 from ...core.checks import GraphError
@@ -23,16 +23,25 @@ Numbers = tuple[int, ...]
 Product = tuple[Graph | None, Numbers]  # of J x_dot or J^T y_bar, none where all is 0, and which results it has
 
 
+def rule_of(statement: Statement, column: str) -> Callable[..., Any]:
+    """The rule of a statement in a column. Raises TypeError where there is none."""
+    row = row_of(statement)
+    if (rule := getattr(row, column)) is None:
+        loop = "; of loops only a FixedPoint has them" if row.bodies else ""
+        raise TypeError(f"a {row.kind.__name__} has no derivatives: its row has no `{column}`{loop}")
+    return rule  # type: ignore[no-any-return]
+
+
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """A statement whose outputs no other one writes; what it changes in place is copied first, by `copies`.
+    """A statement whose outputs no other one writes; `copies` first copy what it changes in place.
 
-    parts: of a statement with bodies, each body in single assignment.
+    parts: its bodies in single assignment, which no other runs; of an iteration one turn more.
     after: for each part, {register that the statement writes: the one that has its value at the end of the part}.
-    carried: of an iteration, whose part is one turn more, the registers that a turn reads before it writes them.
+    carried: of an iteration, the registers that a turn reads before it writes them.
     """
 
-    statement: Statement
+    statement: Any  # of the kind that the rule is for
     copies: tuple[Map, ...] = ()
     parts: tuple[tuple[Assignment, ...], ...] = ()
     after: tuple[Mapping[str, str], ...] = ()
@@ -45,8 +54,15 @@ class Assignment:
 
     @property
     def sources(self) -> Names:
-        """The registers that its copies are of: the values before, of what it changes in place."""
+        """The registers that hold what it changes in place as it was before."""
         return tuple([copy.inputs[0] for copy in self.copies])
+
+    @property
+    def unrun(self) -> list[Statement]:
+        """The statements that passes do not run: of iterations, also inside others, one more turn."""
+        if self.carried:
+            return statements_of(self.parts[0])
+        return [statement for part in self.parts for each in part for statement in each.unrun]
 
 
 def statements_of(assignments: Iterable[Assignment]) -> list[Statement]:
@@ -56,11 +72,12 @@ def statements_of(assignments: Iterable[Assignment]) -> list[Statement]:
 
 @dataclass
 class Registers:
-    """Lengths of registers by name, and new ones, in whose names alone `own` is; and statements over them."""
+    """Lengths of registers, new ones, in whose names alone `own` is, and statements; `active` depend on what moves."""
 
     lengths: dict[str, int]
-    own: str = "@"
-    statements: list[Statement] = field(default_factory=list, init=False)  # what has been added
+    own: str
+    active: Set[str]
+    statements: list[Statement] = field(default_factory=list, init=False)
 
     @property
     def unsolved(self) -> str:
@@ -74,7 +91,7 @@ class Registers:
         return new
 
     def add(self, *statements: Statement) -> None:
-        """Statements after those that are there."""
+        """Add statements after those that are there."""
         self.statements += statements
 
     def zero(self, like: str) -> str:
@@ -82,6 +99,12 @@ class Registers:
         new = self.fresh(like, self.lengths[like])
         self.add(zeroed(new))
         return new
+
+
+def split(items: Sequence[T], lengths: Sequence[int]) -> list[Sequence[T]]:
+    """The items, end to end, by the registers that hold them."""
+    ends = list(itertools.accumulate(lengths, initial=0))
+    return [items[start:end] for start, end in itertools.pairwise(ends)]
 
 
 def nonzero(inputs: Sequence[Node], results: Mapping[int, Sequence[Node]]) -> Product:
@@ -93,47 +116,22 @@ def nonzero(inputs: Sequence[Node], results: Mapping[int, Sequence[Node]]) -> Pr
 
 @kept_by_first
 def tangent_graph(graph: Graph, inputs: Numbers, moving: Numbers, outputs: Numbers) -> Product:
-    """Tangents of outputs from those of the inputs `moving`. Inputs of the graph: its own, tangents.
-
-    inputs, outputs: lengths of the registers that are the inputs of the graph, or its outputs.
-    """
+    """Tangents of outputs from those of the inputs `moving`, by lengths of registers. Inputs: its own, tangents."""
     groups = split(graph.inputs, inputs)
     made = simplify(jvp(graph, [node for k in moving for node in groups[k]]))
     return nonzero(made.inputs, dict(enumerate(split(list(made.outputs.values()), outputs))))
 
 
-def split(items: Sequence[T], lengths: Sequence[int]) -> list[Sequence[T]]:
-    """The items, end to end, by the registers that hold them."""
-    ends = list(itertools.accumulate(lengths, initial=0))
-    return [items[start:end] for start, end in itertools.pairwise(ends)]
-
-
+@dataclass
 class Tangent(Registers):
-    """The statements that push tangents on through assignments.
+    """The statements that push tangents on through assignments.  dots: {register: the one that has its tangent}."""
 
-    dots: {register: the one that has its tangent}; the rules extend it.  active: registers that depend on what moves.
-    values: whether the statements themselves are among `statements`, each before its tangents.
-    """
-
-    def __init__(
-        self, dots: Mapping[str, str], active: Set[str], lengths: dict[str, int], own: str, *, values: bool
-    ) -> None:
-        super().__init__(lengths, own)
-        self.dots, self.active, self.values = dict(dots), active, values
-
-    def inner(self, more: Mapping[str, str], *, values: bool = False) -> Tangent:
-        """Tangent of a body: what has tangents here has them there, and more registers."""
-        return Tangent(self.dots | dict(more), self.active, self.lengths, self.own, values=self.values or values)
+    dots: dict[str, str]
 
     def push(self, assignments: Sequence[Assignment]) -> None:
         """Through these assignments, the first first."""
         for assignment in assignments:
-            row = row_of(assignment.statement)
-            if row.jvp is None:
-                raise TypeError(f"a {row.kind.__name__} has no tangents: its row has no `jvp`")
-            if self.values and not row.reruns:
-                self.add(*assignment.statements)
-            row.jvp(assignment, self)
+            rule_of(assignment.statement, "jvp")(assignment, self)
             for name in set(reads_and_writes(assignment.statement)[1]) - self.active:
                 self.dots.pop(name, None)
 
@@ -144,11 +142,10 @@ class Tangent(Registers):
 
 
 class Linearized(NamedTuple):
-    """A program of tangents or cotangents, and the registers of its vectors.
+    """A program of tangents or cotangents.
 
-    vectors: {register of a value: that of its cotangent or tangent, before and after a pass}.
-    unsolved: a register that is not 0 after passes in which equations of a `FixedPoint` were not solved, and NaN after
-    a loop of more turns than there is room for.
+    vectors: {register of a value: that of its tangent or cotangent, before and after a pass}.
+    unsolved: a register that is not 0 after passes in which equations of a `FixedPoint` were not solved.
     """
 
     program: Program
@@ -159,23 +156,22 @@ class Linearized(NamedTuple):
 class Passes(Registers):
     """A program in single assignment, of which derivatives are made.
 
-    of: registers whose values after a pass matter.  wrt: those by which derivatives are taken, besides what a pass
-    hands on; as attributes those that stay the same, `inputs`, and those of the feed, `varied`.  constant: those whose
-    values have no derivatives.  turns: for how many turns a `While` records what its way back reads; 0 without one.
-
-    plain: the assignments of a pass.  active: registers that depend on what moves.
+    of: registers whose values after a pass matter, by default its record.  wrt: those by which derivatives are taken,
+    besides what a pass hands on; as attributes those that stay the same, `inputs`, and those of the feed, `varied`.
+    constant: those whose values have no derivatives.
+    plain: the assignments of a pass.  constants: registers that passes read and never write.
     handed: {register that a pass hands on to the next: the one that has its value after the pass}.
-    constants: registers that passes read and never write.
-    current: {register of the program: the one that has its value now}, while they are made.
+    current: {register of the program: the one that has its value now}, while assignments are made.
     """
 
     def __init__(
-        self, program: Program, of: Sequence[str], wrt: Sequence[str], constant: Sequence[str] = (), turns: int = 0
+        self, program: Program, of: Sequence[str] | None, wrt: Sequence[str], constant: Sequence[str] = ()
     ) -> None:
         if not isinstance(program, Program):
             raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
         if controls := [name for name in ("record_if", "stop") if getattr(program, name) is not None]:
             raise GraphError(f"a run has derivatives if it does not depend on numbers how long it is: no {controls[0]}")
+        of = program.record if of is None else of
         for what, names in (("of", of), ("wrt", wrt), ("constant", constant)):
             for name in require_sequence(what, names, "registers", str):
                 length_of(program.registers, what, name)
@@ -185,9 +181,8 @@ class Passes(Registers):
             raise GraphError(f"wrt names register {both[0]!r}, which is constant")
         if fed := [name for name in of if name in program.feed]:
             raise GraphError(f"of names register {fed[0]!r}, which is fed: what a pass makes of it is lost in the next")
-        super().__init__(dict(program.registers), _unused("@", program))
-        self._with, self.fed = _unused(":", program), tuple(program.feed)
-        self.turns, self.current = turns, dict[str, str]()
+        super().__init__(dict(program.registers), _unused("@", program), set())
+        self._with, self.fed, self.current = _unused(":", program), tuple(program.feed), dict[str, str]()
         written = effects(program.body)[1]
         kept = [copied(name, name) for name in dict.fromkeys(of) if name not in written]
         self.plain = [self.assignment(each) for each in [*program.body, *kept]]
@@ -212,26 +207,21 @@ class Passes(Registers):
     def assignment(self, statement: Statement) -> Assignment:
         """The statement in single assignment, after those before it."""
         row = row_of(statement)
-        if row.assign is not None:
-            made: Assignment = row.assign(statement, self)
-            return made
         if row.bodies:
-            raise TypeError(f"a {type(statement).__name__} has no derivatives: its row has no `assign`")
+            made: Assignment = rule_of(statement, "assign")(statement, self)
+            return made
         before = {name: self.now(name) for name in names_in(statement, row.reads)}
         new = with_names(statement, [each for each in row.reads if each not in row.writes], self.now)
         new = with_names(new, row.writes, self.write)
         changed = names_in(statement, [each for each in row.writes if each in row.reads])
         return Assignment(new, tuple([copied(before[name], self.now(name)) for name in changed]))
 
-    def tangents(self, directions: Sequence[str], *, values: bool) -> tuple[Tangent, dict[str, str]]:
-        """Tangents of what a pass hands on and of more, and their registers: they end where the next pass reads them.
-
-        values: whether the passes themselves are beside them.
-        """
+    def tangents(self) -> tuple[Tangent, dict[str, str]]:
+        """Tangents of what a pass hands on and reads, and their registers: they end where the next pass reads them."""
         moving = [name for name in self.handed if name in self.active]
-        dots = {name: f"{name}{self._with}dot" for name in (*moving, *directions)}
+        dots = {name: f"{name}{self._with}dot" for name in (*moving, *self.inputs, *self.varied)}
         lengths = self.lengths | {dot: self.lengths[name] for name, dot in dots.items()}
-        tangent = Tangent(dots, self.active, lengths, self.own, values=values)
+        tangent = Tangent(lengths, self.own, self.active, dict(dots))
         tangent.push(self.plain)
         tangent.add(*[copied_or_zero(tangent.dots.get(self.handed[name]), dots[name]) for name in moving])
         return tangent, dots
@@ -256,8 +246,8 @@ def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence
 
     Every register that is recorded or handed on, and every one of `wrt`, has a register "{name}:dot" for its tangent,
     which is set before the first pass and read after the last one: `vectors` of the result. Its record has the rows of
-    the program's, then the tangents of what has tangents in them. Values and tangents are computed side by side; a loop
-    turns as often as its values say, and a `FixedPoint` has the tangent of its equations.
+    the program's, then the tangents of what has tangents in them. A `FixedPoint` has the tangent of its equations, a
+    `While` has none.
 
     program: without `record_if` and `stop`.  wrt: registers that passes read and do not write, or are fed; those that
     passes hand on come with them.  constant: registers whose values have no derivatives, such as guesses.
@@ -272,9 +262,10 @@ def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence
     >>> run.run(run.memory({"x": 3.0, moved.vectors["x"]: 1.0}), passes=2).rows.tolist()
     [[9.0, 6.0], [81.0, 108.0]]
     """
-    passes = Passes(program, program.record if isinstance(program, Program) else (), wrt, constant)
-    tangent, dots = passes.tangents(list(wrt), values=True)
-    body = [*tangent.statements, *[copied(after, before) for before, after in passes.handed.items()]]
+    passes = Passes(program, None, wrt, constant)
+    tangent, dots = passes.tangents()
+    body = [*statements_of(passes.plain), *[statement for each in passes.plain for statement in each.unrun]]
+    body += [*tangent.statements, *[copied(after, before) for before, after in passes.handed.items()]]
     record = [*program.record, *[dots[name] for name in program.record if name in dots]]
     made = passes.program(tangent, body, record, program.feed, {*program.registers, *dots.values()})
     return Linearized(made, dots, passes.unsolved)

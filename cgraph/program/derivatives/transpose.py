@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -20,14 +22,14 @@ from ...util.require import require_mapping, require_whole
 from ..program import Program
 from ..runners.choose_runner import runner
 from ..runners.runner import Runner
-from ..statement import Statement, effects, needed, reads_and_writes, row_of
+from ..statement import Lengths, Statement, effects, length_of, needed, reads_and_writes, row_of
 from ..statements.call import Call, added, copied, copied_or_zero
-from .jvp import Assignment, Linearized, Numbers, Passes, Product, Registers, nonzero, split, statements_of
+from .jvp import Assignment, Linearized, Numbers, Passes, Product, Registers, nonzero, rule_of, split, statements_of
 
 HEAVY_GRAPH = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
-TURNS = 64  # of a loop that its stack has room for, unless more are asked for
 TAPE_BLOCK = 4096  # passes in a block of a tape
 Pullback = Callable[[Sequence[Node]], Graph]  # a graph's own rule: cotangents of these inputs, see `cotangent_graph`
+Pull = Callable[..., tuple[dict[str, Array], dict[str, Array]]]  # see `program_vjp`
 Rules = Mapping[int, tuple[int, Pullback]]  # by the id of a graph; and how many of its first outputs have cotangents
 
 
@@ -50,30 +52,28 @@ def cotangent_graph(
     return nonzero(made.inputs, dict(zip(wanted, results, strict=True)))
 
 
+@dataclass
 class Adjoint(Registers):
     """The statements that pull cotangents back through assignments.
 
-    bars: {register: the one that has its cotangent}, of what comes after, which stay as they are; the rules extend it.
-    active: registers that depend on what moves.  rules: of graphs that a `Call` has.
+    bars: {register: the one that has its cotangent}; of what comes after, these stay as they are.  rules: of graphs.
     """
 
-    def __init__(
-        self, bars: Mapping[str, str], active: Set[str], lengths: dict[str, int], own: str, rules: Rules
-    ) -> None:
-        super().__init__(lengths, own)
-        self.bars, self.active, self.rules, self._kept = dict(bars), active, rules, set(bars.values())
+    bars: dict[str, str]
+    rules: Rules
+    _after: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._after = frozenset(self.bars.values())
 
     def inner(self, bars: Mapping[str, str]) -> Adjoint:
         """Adjoint of a body, from cotangents of its end."""
-        return Adjoint(bars, self.active, self.lengths, self.own, self.rules)
+        return replace(self, bars=dict(bars))
 
     def pull(self, assignments: Sequence[Assignment]) -> None:
         """Through these assignments, the last first."""
         for assignment in reversed(assignments):
-            row = row_of(assignment.statement)
-            if row.transpose is None:
-                raise TypeError(f"a {row.kind.__name__} has no cotangents: its row has no `transpose`")
-            row.transpose(assignment, self)
+            rule_of(assignment.statement, "transpose")(assignment, self)
 
     def bar(self, register: str) -> str:
         """A new register for a cotangent of one."""
@@ -85,36 +85,27 @@ class Adjoint(Registers):
             self.bars[register] = bar
             return
         before = self.bars[register]
-        self.bars[register] = after = self.bar(register) if before in self._kept else before
+        self.bars[register] = after = self.bar(register) if before in self._after else before
         self.add(added(before, bar, after))
 
 
-def recovery(
-    assignments: Sequence[Assignment], values: Iterable[str], *, light: bool = True
-) -> tuple[list[Statement], list[str], set[str]]:
+def _recovery(assignments: Sequence[Assignment], values: Iterable[str]) -> tuple[list[Statement], list[str], set[str]]:
     """How values that assignments computed come back: statements, registers of a record, and what both begin with.
 
-    Results of heavy statements are recorded, others are made again; if not only the `light` ones, all.
+    Results of heavy statements are recorded, others are made again.
     """
     wanted, tape, again = set(values), dict[str, None](), list[Statement]()
     for assignment in reversed(assignments):
         run = assignment.statements
-        for group in [*[(each,) for each in reversed(_unrun(assignment))], run]:
+        for group in [*[(each,) for each in reversed(assignment.unrun)], run]:
             here = [name for name in reads_and_writes(group[-1])[1] if name in wanted]
-            if here and light and group is run and _is_heavy(group[-1]):
+            if here and group is run and _is_heavy(group[-1]):
                 tape |= dict.fromkeys(here)
                 wanted -= set(here)
             elif here:
                 again = [*group, *again]
                 wanted |= set(effects(group)[0])
     return again, list(tape), wanted
-
-
-def _unrun(assignment: Assignment) -> list[Statement]:
-    """Statements that the passes do not run: of iterations, also inside others, one more turn."""
-    if assignment.carried:
-        return statements_of(assignment.parts[0])
-    return [statement for part in assignment.parts for each in part for statement in _unrun(each)]
 
 
 def _is_heavy(statement: Statement) -> bool:
@@ -127,9 +118,9 @@ def _is_heavy(statement: Statement) -> bool:
 def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyType({})) -> Linearized:
     """A pass that pulls cotangents back, of what it hands on, `seeds` among it, and of its inputs.
 
-    It is fed what was recorded, the last pass first, and records the cotangents of `varied`.  rules: of graphs.
+    It is fed what was recorded, the last pass first, and records the cotangents of `varied`.
     """
-    handed, outer = passes.handed, Adjoint({}, passes.active, dict(passes.lengths), passes.own, rules)
+    handed, outer = passes.handed, Adjoint(dict(passes.lengths), passes.own, passes.active, {}, rules)
     bars: dict[str, str] = {}
     more = [*dict.fromkeys(seeds)]
     while True:  # until there are those of all registers that these come from
@@ -146,12 +137,11 @@ def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyTyp
 
 
 def tangent(passes: Passes, record: Sequence[str], then: Sequence[Statement] = ()) -> Linearized:
-    """A pass that pushes tangents on, of what it hands on and of all by which derivatives are taken.
+    """A pass that pushes tangents on, fed what was recorded; it records those of `record`.
 
-    It is fed what was recorded, and records the tangents of `record` after a pass.  then: what else it does with
-    the tangents, {name}:dot.
+    then: what else it does with the tangents, {name}:dot.
     """
-    made, dots = passes.tangents([*passes.inputs, *passes.varied], values=False)
+    made, dots = passes.tangents()
     made.add(*then)
     return _along(passes, made, dots, [dots[name] for name in record])
 
@@ -159,7 +149,7 @@ def tangent(passes: Passes, record: Sequence[str], then: Sequence[Statement] = (
 def _along(passes: Passes, made: Registers, vectors: Mapping[str, str], record: Sequence[str]) -> Linearized:
     """The statements that were made, after those that compute what they need of a pass from what was recorded of it."""
     linear = needed(made.statements, {*vectors.values(), *record, made.unsolved})
-    again, tape, wanted = recovery(passes.plain, effects(linear)[0])
+    again, tape, wanted = _recovery(passes.plain, effects(linear)[0])
     feed = [*[name for name in (*passes.fed, *passes.handed) if name in wanted], *tape]
     program = passes.program(made, [*again, *linear], record, feed, {*vectors.values(), *passes.constants})
     return Linearized(program, vectors, made.unsolved)
@@ -279,111 +269,77 @@ def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
     return memory
 
 
-class Pulled(NamedTuple):
-    """Values at the end of passes, and cotangents at their start.
-
-    values: {register of `of`: its value after the last pass}.  bars: {register: its cotangent} of what is handed on and
-    of `wrt`.  rows: {register of the feed in `wrt`: its cotangents, (passes, length)}.
-
-    >>> from cgraph.extend import Program, program_vjp
-    >>> program_vjp(Program({"x": 1}, [], record=()), ["x"])({"x": 2.0}, 1, {"x": 3.0}).bars
-    {'x': array([3.])}
-    """
-
-    values: dict[str, Array]
-    bars: dict[str, Array]
-    rows: dict[str, Array]
-
-
-class ProgramVjp:
-    """J^T y_bar of any number of passes of a program; made by `program_vjp`.
-
-    forward: runs the passes, which record what their way back reads; what is handed on begins and ends in the registers
-    `handed`, {register: the one that has its value after a pass}.  backward: runs a pass backwards, fed a row of that
-    record, and has cotangents in the registers `vectors`, {register: that of its cotangent}.
-
-    >>> from cgraph.extend import Program, program_vjp
-    >>> pull = program_vjp(Program({"x": 1}, [], record=()), ["x"])
-    >>> pull({"x": 2.0}, passes=5, seeds={"x": 3.0}).bars["x"].tolist()
-    [3.0]
-    """
-
-    def __init__(self, passes: Passes, of: Sequence[str], backend: str, checkpoints: int) -> None:
-        self._along = Along(passes, adjoint(passes, of), of, backend)
-        self._of, self._checkpoints = of, checkpoints
-        self.handed, self.vectors = dict(passes.handed), dict(self._along.linear.vectors)
-        self.forward, self.backward = self._along.forward, self._along.derivative
-
-    def __call__(
-        self,
-        values: Mapping[str, ArrayLike],
-        passes: int,
-        seeds: Mapping[str, ArrayLike],
-        feed: ArrayLike | None = None,
-    ) -> Pulled:
-        """Run at least one pass from values of registers, and pull cotangents of `of` back through them.
-
-        values: {register: value before the first pass}, 0 for others.  seeds: {register of `of`: cotangent after the
-        last pass}, 0 for others.  feed: (passes, feed_width), as for `Runner.run`.
-        Raises GraphError for unknown registers or other shapes, where equations of a `FixedPoint` were not solved, and
-        for a loop that takes more turns than there is room for.
-        """
-        require_whole("passes", passes, 1)
-        rows = np.empty((passes, 0)) if feed is None else real_array("feed", feed)
-        if rows.ndim != 2 or len(rows) != passes:
-            raise GraphError(f"the feed needs a row for each of {passes} passes, got shape {rows.shape}")
-        lengths, inner = self.forward.program.registers, {*self.handed.values()}
-        own, start, bars_after = [name for name in lengths if name not in inner], dict[str, Array](), dict[str, Array]()
-        for what, given, known, to in (("values", values, own, start), ("seeds", seeds, self._of, bars_after)):
-            for name, numbers in require_mapping(what, given, "register: numbers").items():
-                if name not in known:
-                    raise GraphError(f"{what} must be of registers among {', '.join(known)}, got {name!r:.60}")
-                to[name] = real_array(f"{what}[{name!r}]", numbers)
-                if to[name].shape not in ((), (lengths[name],)):
-                    raise GraphError(f"{what}[{name!r}] needs shape ({lengths[name]},), got {to[name].shape}")
-        tape = Tape(self._along, start, lambda first, last: rows[first:last, :, None], checkpoints=self._checkpoints)
-        tape.run(0, passes)
-        bars, slopes, unsolved = tape.cotangents(bars_after)
-        if np.isnan(unsolved[0]):
-            turns = self._along.passes.turns
-            raise GraphError(f"a loop took more turns than the {turns} there is room for: give turns=")
-        if unsolved[0]:
-            raise GraphError("the derivative of a FixedPoint was not solved: its turns do not settle")
-        by_pass, at = dict[str, Array](), 0
-        for name in self._along.passes.varied:
-            by_pass[name] = slopes[:, at : at + lengths[name], 0]
-            at += lengths[name]
-        ends = {name: tape.value(name)[:, 0] for name in self._of}
-        return Pulled(ends, {name: bar[:, 0] for name, bar in bars.items()}, by_pass)
-
-
 def program_vjp(
     program: Program,
     of: Sequence[str],
     wrt: Sequence[str] = (),
     *,
     constant: Sequence[str] = (),
-    turns: int = TURNS,
     checkpoints: int = 0,
     backend: str = "auto",
-) -> ProgramVjp:
+) -> Pull:
     """Cotangents through any number of passes of a program: J^T y_bar of what its registers hold after the last one.
 
     The passes record the results of their heavy graphs and what they begin with; on the way back the rest is computed
-    again. A loop inside a pass records its turns on a stack.
+    again.
 
     program, wrt, constant: as for `program_jvp`; what it records does not matter.  of: registers whose values after the
-    last pass are the result.  turns: for how many turns of a `While` there is room.  checkpoints: keep the memory after
-    every so many passes, and record again from there; 0: keep the record of all.
-    backend: as for `runner`.
+    last pass are the result.  checkpoints: keep the memory after every so many passes, and record again from there; 0:
+    keep the record of all.  backend: as for `runner`.
+    Returns a function `pull(values, passes, seeds, feed=None)` of {register: value before the first pass}, 0 for
+    others, the number of passes, {register of `of`: cotangent after the last one}, 0 for others, and the feed, (passes,
+    feed_width). It gives {register of `of`: value after the last pass}, and {register: cotangent} of what is handed on
+    and of `wrt`; of a register that is fed (passes, length).
+    Raises GraphError for unknown registers or other shapes, and where equations of a `FixedPoint` were not solved;
+    TypeError for a statement without derivative.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, program_vjp
     >>> x, p = cg.variables("x p")
     >>> step = Program({"x": 1, "p": 1}, [Call(cg.Graph([x, p], {"x": p * x}), ("x", "p"), ("x",))], record=["x"])
-    >>> pulled = program_vjp(step, ["x"], ["p"])({"x": 2.0, "p": 3.0}, passes=2, seeds={"x": 1.0})
-    >>> pulled.values["x"].tolist(), pulled.bars["x"].tolist(), pulled.bars["p"].tolist()
+    >>> pull = program_vjp(step, ["x"], ["p"])
+    >>> values, bars = pull({"x": 2.0, "p": 3.0}, passes=2, seeds={"x": 1.0})
+    >>> values["x"].tolist(), bars["x"].tolist(), bars["p"].tolist()
     ([18.0], [9.0], [12.0])
     """
-    passes = Passes(program, of, wrt, constant, require_whole("turns", turns, 1))
-    return ProgramVjp(passes, list(of), backend, require_whole("checkpoints", checkpoints))
+    passes, kept = Passes(program, of, wrt, constant), require_whole("checkpoints", checkpoints)
+    return partial(_pulled, Along(passes, adjoint(passes, of), of, backend), list(of), kept)
+
+
+def _pulled(
+    along: Along,
+    of: Sequence[str],
+    checkpoints: int,
+    values: Mapping[str, ArrayLike],
+    passes: int,
+    seeds: Mapping[str, ArrayLike],
+    feed: ArrayLike | None = None,
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """See `program_vjp`."""
+    rows, lengths = np.empty((require_whole("passes", passes, 1), 0)), along.forward.program.registers
+    rows = rows if feed is None else real_array("feed", feed)
+    if rows.ndim != 2 or len(rows) != passes:
+        raise GraphError(f"the feed needs a row for each of {passes} passes, got shape {rows.shape}")
+    own = {name: length for name, length in lengths.items() if along.passes.own not in name}
+    start, after = _numbers("values", values, own), _numbers("seeds", seeds, {name: own[name] for name in of})
+    tape = Tape(along, start, lambda first, last: rows[first:last, :, None], checkpoints=checkpoints)
+    tape.run(0, passes)
+    bars, slopes, unsolved = tape.cotangents(after)
+    if unsolved[0]:
+        raise GraphError("the derivative of a FixedPoint was not solved: its turns do not settle")
+    found, at = {name: bar[:, 0] for name, bar in bars.items()}, 0
+    for name in along.passes.varied:
+        found[name] = slopes[:, at : at + own[name], 0]
+        at += own[name]
+    return {name: tape.value(name)[:, 0] for name in of}, found
+
+
+def _numbers(what: str, values: Mapping[str, ArrayLike], lengths: Lengths) -> dict[str, Array]:
+    """Values of registers as arrays. Raises GraphError for an unknown one, or a value of another length."""
+    found = {}
+    for name, value in require_mapping(what, values, "register: numbers").items():
+        wanted, numbers = length_of(lengths, what, name), real_array(f"{what}[{name!r}]", value)
+        if numbers.shape not in ((), (wanted,)):
+            raise GraphError(f"{what}[{name!r}] needs shape ({wanted},), got {numbers.shape}")
+        found[name] = np.broadcast_to(numbers, (wanted,))
+    return found

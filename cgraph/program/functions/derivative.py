@@ -25,7 +25,7 @@ from ..program import Program
 from ..runners.runner import Runner
 from ..statement import Names, Statement
 from ..statements.call import Call, Map
-from ..statements.memory import Scatter
+from ..statements.matrix import Scatter
 from .bound_function import BoundFunction
 
 Ready = Callable[[Program], Runner]  # makes a program ready to run

@@ -1,4 +1,4 @@
-"""Factor, Solve: linear equations of a matrix in a register, by LU factorization with partial pivoting.
+"""Factor, Solve, Scatter: linear equations of a matrix by LU factorization with pivoting, and entries put in a matrix.
 
 In NumPy and as LLVM text: the same operations in the same order. Arrays and memory may have an axis of lanes more, the
 last: many matrices side by side, each with pivots of its own.
@@ -15,6 +15,7 @@ import numpy as np
 
 from ...codegen.arithmetic import Arithmetic
 from ...codegen.function_writer import FunctionWriter
+from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ..statement import Execution, Lengths, Statement, length_of, require_length
 
@@ -52,6 +53,16 @@ class Solve(Statement):
     transposed: bool = False
 
 
+@dataclass(frozen=True)
+class Scatter(Statement):
+    """target[places[i]] = source[table[i]]; other numbers of the target stay as they are."""
+
+    source: str
+    target: str
+    table: tuple[int, ...]
+    places: tuple[int, ...]
+
+
 def check_matrix(statement: Factor | Solve, lengths: Lengths) -> None:
     """Raises GraphError if the registers are no n * n, n and n numbers."""
     where = type(statement).__name__
@@ -59,6 +70,18 @@ def check_matrix(statement: Factor | Solve, lengths: Lengths) -> None:
     require_length(lengths, where, statement.matrix, n * n)
     if isinstance(statement, Solve):
         require_length(lengths, where, statement.vector, n)
+
+
+def check_scatter(statement: Scatter, lengths: Lengths) -> None:
+    """Raises GraphError if a place is outside of its register, or there are not as many on either side."""
+    for name, places in ((statement.source, statement.table), (statement.target, statement.places)):
+        size = length_of(lengths, "Scatter", name)
+        if outside := [place for place in places if not (isinstance(place, int) and 0 <= place < size)]:
+            raise GraphError(f"Scatter needs places from 0 to {size - 1} of register {name!r}, got {outside[0]!r:.60}")
+    if len(statement.places) != len(statement.table):
+        raise GraphError(
+            f"Scatter needs a place for each of {len(statement.table)} numbers, got {len(statement.places)}"
+        )
 
 
 def run_factor(statement: Factor, state: dict[str, Any], execution: Execution) -> None:
@@ -93,6 +116,13 @@ def run_solve(statement: Solve, state: dict[str, Any], execution: Execution) -> 
     execution.write(state, statement.vector, b)
 
 
+def run_scatter(statement: Scatter, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python, of one memory or of many."""
+    target = np.array(state[statement.target], dtype=np.float64)
+    target[list(statement.places)] = np.asarray(state[statement.source])[list(statement.table)]
+    execution.write(state, statement.target, target)
+
+
 def factor_text(statement: Factor, writer: Writer) -> None:
     """Write as machine code."""
     _call(writer, "lu.factor", _lu_factor_text, statement, statement.matrix, statement.pivots)
@@ -103,6 +133,12 @@ def solve_text(statement: Solve, writer: Writer) -> None:
     name = "lu.solve.transposed" if statement.transposed else "lu.solve"
     text = partial(_lu_solve_text, name=name, transposed=statement.transposed)
     _call(writer, name, text, statement, statement.matrix, statement.pivots, statement.vector)
+
+
+def scatter_text(statement: Scatter, writer: Writer) -> None:
+    """Write as machine code."""
+    name = writer.functions.take(statement.table, statement.places)
+    writer.call(name, [writer.pointer(statement.source), writer.pointer(statement.target)])
 
 
 def _call(

@@ -14,7 +14,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import TURNS, Along, Array, Passes, adjoint, kept_by_first, memo, tangent
+from cgraph._shared import Along, Array, Passes, adjoint, kept_by_first, memo, tangent
 from cgraph.extend import STATEMENTS, Builder, Call, Map, Program, Statement, folded, topological
 
 from ...equations.substitute import substitute
@@ -195,8 +195,7 @@ def motion_programs(
             if isinstance(each, Call) and each.graph is rate:
                 lengths[f"shared{k}"] = len(shared.outputs) - len(rate.outputs)
                 body[k] = Call(shared, each.inputs, (*each.outputs, f"shared{k}"))
-    constant, turns = (*made.fixed, "evaluations", "nonfinite"), 0 if forwards else TURNS
-    make = partial(Passes, constant=constant, turns=turns)
+    make = partial(Passes, constant=(*made.fixed, "evaluations", "nonfinite"))
     fed = ("t", "h", "tau") if each_step else ("t", "h")
     step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, wrt)
     if forwards:

@@ -16,19 +16,20 @@ from cgraph.extend import STATEMENTS, Call, If, Program, While, program_jvp, pro
 from tests.cgraph.engines import RUNNERS
 from tests.tolerances import SHORT_SUM
 
-COUNT, LENGTHS = 11, {"f": 2, "z": 2, "u": 2, "n": 1, "c": 1}
+COUNT, PASSES, LENGTHS = 11, 4, {"f": 2, "z": 2, "u": 2, "n": 1, "c": 1}
 (Turn,) = [kind for kind in STATEMENTS if kind.__name__ == "Turn"]
 START: dict[str, Array] = {
     name: np.random.default_rng(5).normal(size=(LENGTHS[name], COUNT)) for name in ("f", "z", "u")
 } | {"n": np.arange(COUNT)[None] % 5 * 1.0}
 
 
-def program() -> Program:
+def program(loop: type[If | While] = If) -> Program:
+    """In a loop once, or in a branch as many times as a pass is run."""
     a, b, n = cg.variables("a b n")
     less = Call(cg.Graph([n], {"n": n - 1.0}), ("n",), ("n",))
     real = Call(cg.Graph([a, b], {"c": a}), ("z",), ("c",))
     turns: Any = (real, If("c", (Turn("f", "u", back=True),)), Turn("f", "z"), less)
-    return Program(LENGTHS, [While("n", turns)], record=["z", "u"])
+    return Program(LENGTHS, [loop("n", turns)], record=["z", "u"])
 
 
 def expected(f: complex, z: complex, u: complex, n: float) -> tuple[complex, complex, list[bool]]:
@@ -54,7 +55,7 @@ def one(values: dict[str, Array], k: int) -> dict[str, Array]:
 
 @pytest.mark.parametrize("backend", RUNNERS)
 def test_its_numbers_alone_and_side_by_side(backend: str) -> None:
-    ready = runner(program(), backend, fma=False)
+    ready = runner(program(While), backend, fma=False)
     together = ready.run_many(ready.memory(START, COUNT), 1).rows[0]
     for k in range(COUNT):
         alone = ready.run(ready.memory(one(START, k)), 1).rows[0]
@@ -69,9 +70,9 @@ def test_its_tangents(backend: str) -> None:
     dots = {name: rng.normal(size=(2, COUNT)) for name in ("f", "z", "u")}
     ready = runner(moved.program, backend, fma=False)
     values = START | {moved.vectors[name]: dot for name, dot in dots.items()}
-    together = ready.run_many(ready.memory(values, COUNT), 1).rows[0]
+    together = ready.run_many(ready.memory(values, COUNT), PASSES).rows[-1]
     for k in range(COUNT):
-        row = ready.run(ready.memory(one(values, k)), 1).rows[0]
+        row = ready.run(ready.memory(one(values, k)), PASSES).rows[-1]
         assert row.tolist() == together[:, k].tolist()
         f, z, u, n = numbers(k)
         *ends, ways = expected(f, z, u, n)
@@ -90,10 +91,10 @@ def test_its_cotangents_are_the_transpose(backend: str) -> None:
     for k in range(COUNT):
         along, weights = ({name: rng.normal(size=2) for name in names} for names in (("f", "z", "u"), ("z", "u")))
         memory = forward.memory(one(START, k) | {moved.vectors[name]: dot for name, dot in along.items()})
-        pushed = forward.run(memory, 1).rows[0, 4:]
-        pulled = pull(one(START, k), 1, weights)
+        pushed = forward.run(memory, PASSES).rows[-1, 4:]
+        _, bars = pull(one(START, k), PASSES, weights)
         left = float(np.concatenate(list(weights.values())) @ pushed)
-        right = sum(float(pulled.bars[name] @ dot) for name, dot in along.items())
+        right = sum(float(bars[name] @ dot) for name, dot in along.items())
         assert left == pytest.approx(right, rel=1e3 * SHORT_SUM, abs=1e3 * SHORT_SUM)
 
 

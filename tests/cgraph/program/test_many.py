@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph._shared import Array
-from cgraph.extend import Call, Factor, If, Pop, Program, Push, Solve, While, many, program_jvp, program_vjp, runner
+from cgraph._shared import Along, Array, Passes, adjoint
+from cgraph.extend import Call, Factor, If, Program, Solve, While, many, program_jvp, runner
 from cgraph.program.many import many_keeping, outliving
 from tests.cgraph.program.test_program_derivatives import LENGTHS, PASSES, START, RandomProgram, seeds
 
@@ -45,7 +45,7 @@ def test_random_programs_in_lanes_run_each_to_its_own_stop(seed: int) -> None:
         "clock": clock + 0.3 + 0.1 * cg.sin(count),
     }
     end = Call(cg.Graph([s, n, count, clock], ends), ("s", "n", "passed", "clock"), ("passed", "wish", "over", "clock"))
-    random, rng = RandomProgram(seed).program, np.random.default_rng(seed)
+    random, rng = RandomProgram(seed, whole=True).program, np.random.default_rng(seed)
     lengths = {**random.registers, "n": 1, "clock": 1, "wish": 1, "over": 1, "passed": 1}
     record = [*random.record, "clock"]
     program = Program(lengths, [*random.body, end], record, record_if="wish", stop="over")
@@ -92,24 +92,26 @@ def test_registers_that_nothing_reads_later_are_not_put_back() -> None:
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("seed", seeds(600))
 def test_random_programs_and_their_derivatives_are_the_same_side_by_side(seed: int) -> None:
-    program, rng = RandomProgram(seed).program, np.random.default_rng(seed)
-    backend = "python" if seed % 3 else "auto"
+    rng, backend = np.random.default_rng(seed), "python" if seed % 3 else "auto"
     values = {name: rng.uniform(-2.0, 2.0, (LENGTHS[name], COUNT)) for name in START}
     for lane, edge in EDGES.items():
         values["x"][seed % 3, lane] = edge
     feed = rng.uniform(-1.0, 1.0, (PASSES, 1, COUNT))
+    side_by_side(RandomProgram(seed, whole=True).program, values, feed, backend)
+    program = RandomProgram(seed).program
     side_by_side(program, values, feed, backend)
 
-    moved = program_jvp(program, [*START, "f"], constant=["turns", "count"])
+    moved = program_jvp(program, [*START, "f"], constant=["turns"])
     dots = {dot: rng.normal(size=(LENGTHS[name], COUNT)) for name, dot in moved.vectors.items()}
     side_by_side(moved.program, values | dots, feed, backend)
 
     ends = ["x", "y", "z", "s"]
-    pulled = program_vjp(program, ends, [*START, "f"], constant=["turns", "count"], backend="python")
-    starts = {pulled.handed.get(name, name): value for name, value in values.items()}
-    tape = side_by_side(pulled.forward.program, starts, feed, backend)
-    back = pulled.backward.program
-    seeds = {pulled.vectors[name]: rng.normal(size=(LENGTHS[name], COUNT)) for name in ends}
+    passes = Passes(program, ends, [*START, "f"], constant=["turns"])
+    along = Along(passes, adjoint(passes, ends), ends, "python")
+    starts = {passes.handed.get(name, name): value for name, value in values.items()}
+    tape = side_by_side(along.forward.program, starts, feed, backend)
+    back = along.derivative.program
+    seeds = {along.linear.vectors[name]: rng.normal(size=(LENGTHS[name], COUNT)) for name in ends}
     known = {name: value for name, value in values.items() if name in back.registers}
     side_by_side(back, known | seeds, tape[::-1, : back.feed_width], backend)
 
@@ -153,24 +155,6 @@ def test_every_lane_has_pivots_of_its_own(backend: str, transposed: bool) -> Non
         matrix = matrices[:, :, k].T if transposed else matrices[:, :, k]
         assert rows[0, :, k] == pytest.approx(np.linalg.solve(matrix, b[:, k]), rel=1e-12)
     assert rows[0, :, 0].tolist() == b[:, 0].tolist()
-
-
-def test_every_lane_has_rows_of_its_own_on_a_stack(backend: str) -> None:
-    """n rows on a stack of 4, and m off it: the full and the empty ones count NaN."""
-    a = cg.variables("a0 a1 a2")
-    turned = cg.Graph(a, {"a": a[1] + 1.0, "b": a[2] * 2.0, "c": a[0]})
-    registers = {"x": 1, "y": 2, "stack": 12, "count": 1, "n": 1, "m": 1}
-    less = Call(cg.Graph([X], {"m": X - 1.0}), ("m",), ("m",))
-    turn = Call(turned, ("x", "y"), ("x", "y"))
-    rows = ("y", "x")
-    body = [
-        While("n", (Push("stack", "count", rows), turn, LESS)),
-        While("m", (Pop("stack", "count", rows), less)),
-    ]
-    values = {"n": np.arange(COUNT)[None] % 6 * 1.0, "m": np.arange(COUNT)[None] % 4 * 1.0}
-    values |= {"x": np.arange(COUNT)[None] * 1.0, "y": np.ones((2, COUNT)) + np.arange(COUNT)}
-    program = Program(registers, body, record=["x", "y", "stack", "count"])
-    side_by_side(program, values, np.empty((2, 0, COUNT)), backend)
 
 
 def test_a_batch_of_a_program_with_a_loop(backend: str) -> None:

@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Sum, While, runner
-from cgraph.program.statements.memory import Scatter
+from cgraph.program.statements.matrix import Scatter
 from tests.each_row import each_row
 from tests.repeated import repeated
 from tests.strategies import examples
