@@ -390,7 +390,7 @@ CALLS |= {
     "extend.Runner.run": call(FED.run, np.zeros(1), 2, 1, np.zeros((2, 1))),
     "extend.Runner.run_many": call(FED.run_many, np.zeros((1, 3)), 2, 1, np.zeros((2, 1, 3))),
     "extend.Solve": call(a_program_of(extend.Solve), "x", "y", "z"),
-    "extend.Sum": call(a_program_of(extend.Sum), HALVE, ("x",), "y"),
+    "extend.Sum": call(a_program_of(extend.Sum), HALVE, ("x",), ("y",)),
     "extend.While": call(a_program_of(extend.While), "x", (HALF,)),
     "extend.as_node": call(extend.as_node, 1.0),
     "extend.building": call(built_by, extend.Builder()),

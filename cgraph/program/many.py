@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from ..core.graph import Graph
 from ..operations.table import where
 from ..writing.naming import variables
-from .program import Program, live_registers, outliving
+from .program import Program, live_registers, outliving, unused_sign
 from .statement import Statement, reads_and_writes, row_of
 from .statements.call import Call, Map, copied
 from .statements.control import FixedPoint, If, While
@@ -38,24 +38,21 @@ def many(program: Program) -> Program:
 
 def many_keeping(program: Program, kept: Iterable[str]) -> Program:
     """`many`, but what is neither kept nor outlives a pass is put back only where something reads it."""
-    if all([row_of(each).masked is None for each in program.statements()]):
+    if not any([row_of(each).bodies for each in program.statements()]):
         return program
-    lengths, own, after = dict(program.registers), ":", dict[int, Set[str]]()
-    while any([own in name for name in lengths]):
-        own += ":"
+    lengths, after = dict(program.registers), dict[int, Set[str]]()
     live_registers(program.body, {*kept, *outliving(program)}, after)
-    masked = Masked(lengths, own, after)
+    masked = _Masked(lengths, unused_sign(":", lengths), after)
     masked.run(program.body)
     return replace(program, registers=lengths, body=tuple(masked.statements))
 
 
 @dataclass
-class Masked:
+class _Masked:
     """Statements that change the lanes of a mask alone, when what they write is put back in the others.
 
-    lengths: of all registers; grows.  own: a sign in no name of the program's.  after: {id of a statement with bodies:
-    the registers that are read behind them}.  mask: the register that is 1 in its lanes, else 0; none: all lanes.
-    statements: what has been added.  written: registers to be put back.
+    own: a sign in no name of the program's.  after: {id of a statement: the registers that are read behind its bodies}.
+    mask: the register that is 1 in its lanes, else 0; none: all lanes.  written: registers to be put back.
     """
 
     lengths: dict[str, int]
@@ -67,53 +64,48 @@ class Masked:
     written: dict[str, None] = field(default_factory=dict)
 
     def run(self, statements: Sequence[Statement]) -> None:
-        """Statements, one after another."""
+        """Add statements, one after another."""
         for statement in statements:
-            rule = row_of(statement).masked
-            if rule is None:
-                self.add(statement)
-                self.written |= dict.fromkeys(reads_and_writes(statement)[1])
+            if isinstance(statement, If):
+                self._branch(statement)
+            elif isinstance(statement, While | FixedPoint):
+                self._loop(statement)
             else:
-                rule(statement, self)
+                self.statements.append(statement)
+                self.written |= dict.fromkeys(reads_and_writes(statement)[1])
 
-    def add(self, *statements: Statement) -> None:
-        """Statements which change nothing of the program's in other lanes."""
-        self.statements += statements
+    def _branch(self, statement: If) -> None:
+        """Add both bodies, each in its lanes."""
+        on, off = self._register("on"), self._register("off")
+        graph = _WAYS_IN_MASK if self.mask else _WAYS
+        self.statements.append(Call(graph, (statement.register, *self.mask), (on, off)))
+        for way, body in ((on, statement.body), (off, statement.otherwise)):
+            if body:
+                self.statements.append(If(way, self._body(statement, body, way), seldom=statement.seldom))
 
-    def body(self, statement: Statement, statements: Sequence[Statement], mask: str) -> tuple[Statement, ...]:
-        """A body of a statement in the lanes of a mask: what it writes is kept before, and put back in the others."""
+    def _loop(self, statement: While | FixedPoint) -> None:
+        """Add turns in the lanes that still go on."""
+        going = self._register("going")
+        graph = _GOING_IN_MASK if self.mask else _GOING
+        self.statements.append(Call(graph, (statement.register, *self.mask), (going,)))
+        turn = self._body(statement, statement.body, going)
+        self.statements.append(While(going, (*turn, Call(_GOING_IN_MASK, (statement.register, going), (going,)))))
+
+    def _body(self, statement: Statement, statements: Sequence[Statement], mask: str) -> tuple[Statement, ...]:
+        """A body in the lanes of a mask: what it writes is kept before, and put back in the others."""
         inner = replace(self, mask=(mask,), depth=self.depth + 1, statements=[], written={})
         inner.run(statements)
         back = [name for name in inner.written if name in self.after[id(statement)]]
-        before = {name: inner.register(f"{name} before", self.lengths[name]) for name in back}
+        before = {name: inner._register(f"{name} before", self.lengths[name]) for name in back}
         keep = [copied(name, kept) for name, kept in before.items()]
         choose = [Map(_CHOSEN, (mask, name, kept), (name,)) for name, kept in before.items()]
         return (*keep, *inner.statements, *choose)
 
-    def register(self, name: str, length: int = 1) -> str:
+    def _register(self, name: str, length: int = 1) -> str:
         """A register for a body at this depth, which others at this depth share."""
         own = f"{name}{self.own}{self.depth}"
         self.lengths.setdefault(own, length)
         return own
-
-
-def masked_if(statement: If, masked: Masked) -> None:
-    """Run both bodies, each in its lanes."""
-    on, off = masked.register("on"), masked.register("off")
-    graph = _WAYS_IN_MASK if masked.mask else _WAYS
-    masked.add(Call(graph, (statement.register, *masked.mask), (on, off)))
-    for way, body in ((on, statement.body), (off, statement.otherwise)):
-        if body:
-            masked.add(If(way, masked.body(statement, body, way), seldom=statement.seldom))
-
-
-def masked_while(statement: While | FixedPoint, masked: Masked) -> None:
-    """Turns in the lanes that still go on."""
-    going = masked.register("going")
-    graph = _GOING_IN_MASK if masked.mask else _GOING
-    masked.add(Call(graph, (statement.register, *masked.mask), (going,)))
-    turn = masked.body(statement, statement.body, going)
-    masked.add(While(going, (*turn, Call(_GOING_IN_MASK, (statement.register, going), (going,)))))
 
 
 _C, _MASK, _NEW, _OLD = variables("c mask new old")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -115,6 +115,14 @@ class Program:
         named = [(statement, row_of(statement).graph) for statement in self.statements()]
         graphs = [getattr(statement, name) for statement, name in named if name]
         return list({id(graph): graph for graph in graphs}.values())
+
+
+def unused_sign(sign: str, names: Iterable[str]) -> str:
+    """The sign, as often as it is in no name."""
+    own = sign
+    while any([own in name for name in names]):
+        own += sign
+    return own
 
 
 def whole_graph(program: Program, x: str) -> Graph | None:

@@ -44,7 +44,6 @@ class StatementRow:
     graph: str = ""  # its field that is a graph
     text: Rule | None = None  # (statement, writer): LLVM's text; without it, it runs in Python
     beside: Rule | None = None  # as `run`, on arrays (length, N); with it `text` has to write for vectors, too
-    masked: Rule | None = None  # (statement, masked): adds what does the same in the lanes of a mask, see `Masked`
     assign: Callable[..., Any] | None = None  # (statement, assigned): its assignment, which bodies need
     jvp: Rule | None = None  # (assignment, tangent): adds the statements that push tangents on
     transpose: Rule | None = None  # (assignment, adjoint): adds those that pull cotangents back

@@ -14,9 +14,9 @@ from ...core.node import Node
 from ...simplification.simplify import simplify
 from ...util.caches import kept_by_first
 from ...util.require import require_sequence
-from ..program import Program
+from ..program import Program, unused_sign
 from ..statement import Names, Statement, effects, length_of, names_in, reads_and_writes, row_of, with_names
-from ..statements.call import Map, copied, copied_or_zero, zeroed
+from ..statements.call import Map, copied
 
 T = TypeVar("T")
 Numbers = tuple[int, ...]
@@ -93,12 +93,6 @@ class Registers:
     def add(self, *statements: Statement) -> None:
         """Add statements after those that are there."""
         self.statements += statements
-
-    def zero(self, like: str) -> str:
-        """A new register of zeros, as long as another."""
-        new = self.fresh(like, self.lengths[like])
-        self.add(zeroed(new))
-        return new
 
 
 def split(items: Sequence[T], lengths: Sequence[int]) -> list[Sequence[T]]:
@@ -181,8 +175,8 @@ class Passes(Registers):
             raise GraphError(f"wrt names register {both[0]!r}, which is constant")
         if fed := [name for name in of if name in program.feed]:
             raise GraphError(f"of names register {fed[0]!r}, which is fed: what a pass makes of it is lost in the next")
-        super().__init__(dict(program.registers), _unused("@", program), set())
-        self._with, self.fed, self.current = _unused(":", program), tuple(program.feed), dict[str, str]()
+        super().__init__(dict(program.registers), unused_sign("@", program.registers), set())
+        self._with, self.fed, self.current = unused_sign(":", program.registers), tuple(program.feed), dict[str, str]()
         written = effects(program.body)[1]
         kept = [copied(name, name) for name in dict.fromkeys(of) if name not in written]
         self.plain = [self.assignment(each) for each in [*program.body, *kept]]
@@ -223,7 +217,7 @@ class Passes(Registers):
         lengths = self.lengths | {dot: self.lengths[name] for name, dot in dots.items()}
         tangent = Tangent(lengths, self.own, self.active, dict(dots))
         tangent.push(self.plain)
-        tangent.add(*[copied_or_zero(tangent.dots.get(self.handed[name]), dots[name]) for name in moving])
+        tangent.add(*[copied(tangent.dots.get(self.handed[name]), dots[name]) for name in moving])
         return tangent, dots
 
     def program(
@@ -269,14 +263,6 @@ def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence
     record = [*program.record, *[dots[name] for name in program.record if name in dots]]
     made = passes.program(tangent, body, record, program.feed, {*program.registers, *dots.values()})
     return Linearized(made, dots, passes.unsolved)
-
-
-def _unused(sign: str, program: Program) -> str:
-    """The sign, as often as no register of the program has it in its name."""
-    own = sign
-    while any([own in name for name in program.registers]):
-        own += sign
-    return own
 
 
 def _active(assignments: Sequence[Assignment], moving: Set[str], constant: Set[str], own: str) -> set[str]:

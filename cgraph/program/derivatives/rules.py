@@ -11,7 +11,7 @@ from ...core.node import constant
 from ...operations.table import maximum, where
 from ...writing.naming import variables
 from ..statement import Names, Statement, bodies_of, effects, reads_and_writes, row_of, with_names
-from ..statements.call import Call, Map, Sum, added, copied, copied_or_zero, elements, sizes
+from ..statements.call import Call, Map, Sum, added, copied, elements, sizes
 from ..statements.control import FixedPoint, If, While
 from ..statements.matrix import Solve
 from .jvp import Assignment, Numbers, Passes, Registers, Tangent, split, statements_of, tangent_graph
@@ -121,7 +121,9 @@ def push_solve(assignment: Assignment, tangent: Tangent) -> None:
     if matrix is None and side is None:
         return
     dot = tangent.dot(solve.vector)
-    side = side or tangent.zero(right)
+    if side is None:
+        side = tangent.fresh(right, n)
+        tangent.add(copied(None, side))
     if matrix is None:
         tangent.add(copied(side, dot))
     else:
@@ -218,7 +220,7 @@ def _add_if(
 ) -> None:
     """Add both branches, at whose ends what each has `found` for a register is in that of `ends`, or else 0."""
     ways = [
-        (*each.statements, *[copied_or_zero(of.get(name), end) for name, end in ends.items()])
+        (*each.statements, *[copied(of.get(name), end) for name, end in ends.items()])
         for each, of in zip(inner, found, strict=True)
     ]
     if ends:
@@ -286,7 +288,7 @@ def _add_settled(
         registers.fresh(name, 1) for name in ("going", "turns", "stalled", "change_old", "change", "d", "s")
     ]
     body: list[Statement] = [*turn, Call(Graph([], {"zero": 0.0}), (), (total,))]
-    registers.add(*[copied_or_zero(v, u) for u, v, _ in rows])
+    registers.add(*[copied(v, u) for u, v, _ in rows])
     for u, v, result in rows:
         if result is not None:
             new = registers.fresh("new", registers.lengths[u])

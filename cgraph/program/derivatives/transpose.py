@@ -23,7 +23,7 @@ from ..program import Program
 from ..runners.choose_runner import runner
 from ..runners.runner import Runner
 from ..statement import Lengths, Statement, effects, length_of, needed, reads_and_writes, row_of
-from ..statements.call import Call, added, copied, copied_or_zero
+from ..statements.call import Call, added, copied
 from .jvp import Assignment, Linearized, Numbers, Passes, Product, Registers, nonzero, rule_of, split, statements_of
 
 HEAVY_GRAPH = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
@@ -132,7 +132,7 @@ def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyTyp
             break
     sums, rows = ({name: outer.bar(name) for name in names} for names in (passes.inputs, passes.varied))
     inner.add(*[added(end, inner.bars[name], end) for name, end in sums.items() if name in inner.bars])
-    inner.add(*[copied_or_zero(inner.bars.get(name), end) for name, end in {**bars, **rows}.items()])
+    inner.add(*[copied(inner.bars.get(name), end) for name, end in {**bars, **rows}.items()])
     return _along(passes, inner, bars | sums, [*rows.values()])
 
 

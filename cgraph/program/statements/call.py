@@ -66,7 +66,7 @@ class Map(Statement):
     asked: Names = ()
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True)
 class Sum(Statement):
     """outputs = sum over i of graph(shared, inputs[i]), from the first element to the last.
 
@@ -75,7 +75,7 @@ class Sum(Statement):
     >>> import cgraph as cg
     >>> from cgraph.extend import Sum
     >>> x = cg.variable("x")
-    >>> norm = Sum(cg.Graph([x], {"square": x * x}), ("values",), "total")
+    >>> norm = Sum(cg.Graph([x], {"square": x * x}), ("values",), ("total",))
     """
 
     graph: Graph
@@ -83,17 +83,9 @@ class Sum(Statement):
     outputs: Names
     shared: Names = ()
 
-    def __init__(self, graph: Graph, inputs: Names, outputs: str | Names, shared: Names = ()) -> None:
-        values = (graph, inputs, (outputs,) if isinstance(outputs, str) else outputs, shared)
-        for name, value in zip(("graph", "inputs", "outputs", "shared"), values, strict=True):
-            object.__setattr__(self, name, value)
-
 
 def products_in(call: Call) -> Mapping[Node, Node]:
-    """{sum or difference: its argument, a product that it is rounded with}, where arithmetic fuses them.
-
-    A call that was made of several statements has those of each.
-    """
+    """{sum or difference: its argument, a product that it is rounded with}, where arithmetic fuses them."""
     return products_of(call.graph) if call.products is None else call.products
 
 
@@ -123,24 +115,14 @@ def _total(lengths: Lengths, names: Names) -> int:
     return sum([lengths[name] for name in names])
 
 
-def copied(source: str, target: str) -> Map:
-    """Statement target = source, of registers of one length.
+def copied(source: str | None, target: str) -> Map:
+    """Statement target = source, of registers of one length; target = 0 where the source is None.
 
     >>> from cgraph.extend import copied
     >>> copied("x_new", "x").outputs
     ('x',)
     """
-    return Map(_SAME, (source,), (target,))
-
-
-def zeroed(register: str) -> Map:
-    """register = 0."""
-    return Map(_ZERO, (register,), (register,))
-
-
-def copied_or_zero(source: str | None, target: str) -> Map:
-    """target = source, or 0 where there is none."""
-    return zeroed(target) if source is None else copied(source, target)
+    return Map(_ZERO, (target,), (target,)) if source is None else Map(_SAME, (source,), (target,))
 
 
 def added(total: str, term: str, result: str) -> Map:
@@ -159,20 +141,15 @@ _ZERO = Graph([_A], {"zero": 0.0})
 _ADDED = Graph([_A, _B], {"sum": _A + _B})
 
 
-# what registers must fit
-
-
-def _statement_text(statement: Call | Map | Sum) -> str:
-    """How an error calls a statement."""
-    graph = statement.graph
-    return (
-        f"{type(statement).__name__} of a graph {', '.join(graph.input_names[:4])} -> {', '.join([*graph.outputs][:4])}"
-    )
+def _text(statement: Call | Map | Sum) -> str:
+    """The statement as an error calls it."""
+    inputs, outputs = statement.graph.input_names[:4], list(statement.graph.outputs)[:4]
+    return f"{type(statement).__name__} of a graph {', '.join(inputs)} -> {', '.join(outputs)}"
 
 
 def check_call(call: Call, lengths: Lengths) -> None:
     """Raises GraphError if the registers do not hold as many numbers as the graph has inputs and outputs."""
-    where = _statement_text(call)
+    where = _text(call)
     _require_total(where, lengths, "inputs", call.inputs, len(call.graph.inputs))
     _require_total(where, lengths, "outputs", call.outputs, len(call.graph.outputs))
     require_once(where, call.outputs)
@@ -180,7 +157,7 @@ def check_call(call: Call, lengths: Lengths) -> None:
 
 def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
-    where, graph, outputs = _statement_text(statement), statement.graph, statement.outputs
+    where, graph, outputs = _text(statement), statement.graph, statement.outputs
     known = sum([length_of(lengths, where, name) for name in statement.shared])
     if known > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
@@ -191,8 +168,6 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
         registers.append((outputs, len(graph.outputs)))
         for name in statement.asked:
             require_length(lengths, where, name, 1)
-    elif len(outputs) == len(graph.outputs) == 1:
-        require_length(lengths, where, outputs[0], 1)
     else:
         _require_total(where, lengths, "outputs", outputs, len(graph.outputs))
     count = elements(statement, lengths)
@@ -209,9 +184,6 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
 def _require_total(where: str, lengths: Lengths, what: str, names: Names, wanted: int) -> None:
     if (total := sum([length_of(lengths, where, name) for name in names])) != wanted:
         raise GraphError(f"{where} needs {wanted} {what}, the registers {', '.join(names)} hold {total}")
-
-
-# in Python: of one memory, and of many
 
 
 def run_call(call: Call, state: State, execution: Execution) -> None:
@@ -297,9 +269,6 @@ def _at_once(statement: Map | Sum, state: dict[str, Any], shape: tuple[int, ...]
         rows += [np.broadcast_to(row, shape) for row in numbers]
     points = np.array(rows).reshape(len(rows), math.prod(shape))
     return execution.batch(statement.graph, points).reshape(len(statement.graph.outputs), *shape)
-
-
-# as machine code
 
 
 def call_text(call: Call, writer: Writer) -> None:

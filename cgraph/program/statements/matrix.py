@@ -15,7 +15,6 @@ import numpy as np
 
 from ...codegen.arithmetic import Arithmetic
 from ...codegen.function_writer import FunctionWriter
-from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ..statement import Execution, Lengths, Statement, length_of, require_length
 
@@ -70,18 +69,6 @@ def check_matrix(statement: Factor | Solve, lengths: Lengths) -> None:
     require_length(lengths, where, statement.matrix, n * n)
     if isinstance(statement, Solve):
         require_length(lengths, where, statement.vector, n)
-
-
-def check_scatter(statement: Scatter, lengths: Lengths) -> None:
-    """Raises GraphError if a place is outside of its register, or there are not as many on either side."""
-    for name, places in ((statement.source, statement.table), (statement.target, statement.places)):
-        size = length_of(lengths, "Scatter", name)
-        if outside := [place for place in places if not (isinstance(place, int) and 0 <= place < size)]:
-            raise GraphError(f"Scatter needs places from 0 to {size - 1} of register {name!r}, got {outside[0]!r:.60}")
-    if len(statement.places) != len(statement.table):
-        raise GraphError(
-            f"Scatter needs a place for each of {len(statement.table)} numbers, got {len(statement.places)}"
-        )
 
 
 def run_factor(statement: Factor, state: dict[str, Any], execution: Execution) -> None:

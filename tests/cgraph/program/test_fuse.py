@@ -26,7 +26,7 @@ def oscillators(weights=(0.5, 0.5, 1.0)):
         body += [Map(move, ("x", f"k{stage}"), ("at",), shared=("h",)), Call(rate, ("at",), (f"k{stage + 1}",))]
     total = x + h / 6.0 * (k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3])
     body += [Map(cg.Graph([x, h, *k], {"x": total}), ("x", "h", "k0", "k1", "k2", "k3"), ("x",))]
-    body += [Sum(cg.Graph([x], {"square": x * x}), ("x",), "energy")]
+    body += [Sum(cg.Graph([x], {"square": x * x}), ("x",), ("energy",))]
     again = Call(cg.Graph([x], {"again": 1.5 - x}), ("again",), ("again",))
     choice = If("energy", (Map(cg.Graph([x], {"x": x + 0.0}), ("x",), ("x",)),), (again,))
     return [

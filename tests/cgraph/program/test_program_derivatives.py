@@ -87,7 +87,7 @@ class RandomProgram:
 
     def total(self, depth: int) -> list[Statement]:
         u, v = cg.variables("u v")
-        return [Sum(cg.Graph([u, v], {"a": 0.5 * self.formula([u, v])}), (self.vector(), "f"), "s")]
+        return [Sum(cg.Graph([u, v], {"a": 0.5 * self.formula([u, v])}), (self.vector(), "f"), ("s",))]
 
     def totals(self, depth: int) -> list[Statement]:
         p, q, u = cg.variables("p q u")
@@ -123,7 +123,7 @@ class RandomProgram:
         table = self.rng.integers(0, N, N).tolist()
         keep = moved("new pairs", "singles", table)
         taken = moved(str(self.rng.choice(["results", "new pairs"])), self.vector(), table)
-        total = Sum(cg.Graph(nodes[3:], {"t": b * self.formula([a, c])}), ("new pairs", "results"), "s")
+        total = Sum(cg.Graph(nodes[3:], {"t": b * self.formula([a, c])}), ("new pairs", "results"), ("s",))
         return [fill, Map(graph, ("pairs", "singles"), outputs, ("p", "s")), keep, taken, total]
 
     def loop(self, depth: int) -> list[Statement]:
