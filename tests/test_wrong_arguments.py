@@ -372,7 +372,7 @@ CALLS |= {
     "extend.FixedPoint": call(a_program_of(extend.FixedPoint), "x", (HALF,)),
     "extend.many": call(extend.many, PROGRAM),
     "extend.program_jvp": call(extend.program_jvp, PROGRAM, [], constant=[]),
-    "extend.program_vjp": call(extend.program_vjp, PROGRAM, ["x"], [], constant=[], checkpoints=0, backend="python"),
+    "extend.program_vjp": call(extend.program_vjp, PROGRAM, ["x"], [], constant=[], backend="python"),
     "extend.register_statement": call(registered_statement, extend.STATEMENTS[extend.Call]),
     "extend.Factor": call(a_program_of(extend.Factor), "x", "y"),
     "extend.added": call(a_program_of(extend.added), "x", "y", "z"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -55,27 +55,21 @@ STATEMENTS: dict[type[Statement], StatementRow] = {}  # filled by table.py
 def register_statement(row: StatementRow) -> None:
     """Add a row to the table of statements: from then on programs may have statements of its kind.
 
-    Raises TypeError for what is no row, or a kind that is no class over `Statement`; ValueError for a kind that is in
-    the table already, or has no field of a name in `reads`, `writes`, `bodies`, `graph`.
+    Raises TypeError for what is no row of a class over `Statement`; ValueError for a kind that is in the table already,
+    or has no field of a name in `reads`, `writes`, `bodies`, `graph`.
 
     >>> from cgraph.extend import STATEMENTS, Call, register_statement
     >>> register_statement(STATEMENTS[Call])
     Traceback (most recent call last):
     ValueError: statement Call is in the table already
     """
-    if not isinstance(row, StatementRow):
-        raise TypeError(f"register_statement takes a StatementRow, got {type(row).__name__}: {row!r:.60}")
-    if not (isinstance(row.kind, type) and issubclass(row.kind, Statement)):
-        raise TypeError(f"a kind of statement must be a class over Statement, got {row.kind!r:.60}")
+    if not (isinstance(row, StatementRow) and isinstance(row.kind, type) and issubclass(row.kind, Statement)):
+        raise TypeError(f"register_statement takes a StatementRow of a class over Statement, got {row!r:.60}")
     name = row.kind.__name__
     if row.kind in STATEMENTS:
         raise ValueError(f"statement {name} is in the table already")
-    for column in ("reads", "writes", "bodies"):
-        if not isinstance(getattr(row, column), tuple):
-            raise TypeError(f"statement {name}: {column} must be a tuple of fields, got {getattr(row, column)!r:.60}")
     fields = getattr(row.kind, "__dataclass_fields__", {})
-    wanted = (*row.reads, *row.writes, *row.bodies, *([row.graph] if row.graph else []))
-    if unknown := [field for field in wanted if field not in fields]:
+    if unknown := [each for each in (*row.reads, *row.writes, *row.bodies, row.graph) if each and each not in fields]:
         raise ValueError(f"statement {name} has no field {unknown[0]!r} (it has {', '.join(fields) or 'none'})")
     STATEMENTS[row.kind] = row
 
@@ -90,11 +84,7 @@ def row_of(statement: Statement) -> StatementRow:
 
 @dataclass(frozen=True)
 class Execution:
-    """Means of the rules in Python: graphs at points, and other statements.
-
-    values: (graph, x) -> the outputs at a point.  batch: (graph, points (inputs, N)) -> the outputs (outputs, N).
-    many: how many memories run side by side; -1: one alone.
-    """
+    """Means of the rules in Python: graphs at a point, or at points (inputs, N); so `many` memories, -1: one alone."""
 
     lengths: Lengths
     values: Callable[[Graph, Sequence[float]], Sequence[float]]
@@ -120,24 +110,15 @@ class Execution:
 
 def names_in(statement: Statement, fields: Iterable[str]) -> Names:
     """The registers that some fields name."""
-    names: list[str] = []
-    for field in fields:
-        value = getattr(statement, field)
-        names += [value] if isinstance(value, str) else value
-    return tuple(names)
+    values = [getattr(statement, field) for field in fields]
+    return tuple([name for value in values for name in ((value,) if isinstance(value, str) else value)])
 
 
-S = TypeVar("S", bound=Statement)
-
-
-def with_names(statement: S, fields: Iterable[str], new: Callable[[str], str]) -> S:
+def with_names(statement: Any, fields: Iterable[str], new: Callable[[str], str]) -> Any:
     """The statement with other registers in some fields."""
     values = {field: getattr(statement, field) for field in fields}
-    changed: dict[str, Any] = {
-        field: new(value) if isinstance(value, str) else tuple([new(name) for name in value])
-        for field, value in values.items()
-    }
-    return replace(statement, **changed)  # type: ignore[type-var]
+    changed = {k: new(v) if isinstance(v, str) else tuple([new(name) for name in v]) for k, v in values.items()}
+    return replace(statement, **changed)
 
 
 def bodies_of(statement: Statement) -> tuple[Sequence[Statement], ...]:

@@ -151,11 +151,9 @@ class Passes(Registers):
     """A program in single assignment, of which derivatives are made.
 
     of: registers whose values after a pass matter, by default its record.  wrt: those by which derivatives are taken,
-    besides what a pass hands on; as attributes those that stay the same, `inputs`, and those of the feed, `varied`.
-    constant: those whose values have no derivatives.
-    plain: the assignments of a pass.  constants: registers that passes read and never write.
+    besides what a pass hands on: `inputs`, which stay the same, and `varied`, of the feed.  constant: those whose
+    values have no derivatives.  plain: the assignments.  constants: registers that passes read and never write.
     handed: {register that a pass hands on to the next: the one that has its value after the pass}.
-    current: {register of the program: the one that has its value now}, while assignments are made.
     """
 
     def __init__(
@@ -176,7 +174,8 @@ class Passes(Registers):
         if fed := [name for name in of if name in program.feed]:
             raise GraphError(f"of names register {fed[0]!r}, which is fed: what a pass makes of it is lost in the next")
         super().__init__(dict(program.registers), unused_sign("@", program.registers), set())
-        self._with, self.fed, self.current = unused_sign(":", program.registers), tuple(program.feed), dict[str, str]()
+        self._with, self.fed = unused_sign(":", program.registers), tuple(program.feed)
+        self.current = dict[str, str]()  # {register of the program: the one that has its value}, here in the body
         written = effects(program.body)[1]
         kept = [copied(name, name) for name in dict.fromkeys(of) if name not in written]
         self.plain = [self.assignment(each) for each in [*program.body, *kept]]

@@ -186,13 +186,13 @@ def assign_if(statement: If, passes: Passes) -> Assignment:
 
 def push_if(assignment: Assignment, tangent: Tangent) -> None:
     """The tangents of the branch that is taken."""
-    inner = [replace(tangent, dots=dict(tangent.dots)) for _ in assignment.parts]
-    for each, part in zip(inner, assignment.parts, strict=True):
-        each.push(part)
-    ways = list(zip(inner, assignment.after, strict=True))
-    found = [{name: each.dots[end] for name, end in after.items() if end in each.dots} for each, after in ways]
-    names = [name for name in assignment.after[0] if name in tangent.active and any([name in of for of in found])]
-    _add_if(assignment, tangent, inner, found, {name: tangent.dot(name) for name in names})
+    ways = []
+    for part, after in zip(assignment.parts, assignment.after, strict=True):
+        inner = replace(tangent, dots=dict(tangent.dots))
+        inner.push(part)
+        ways.append((inner, {name: inner.dots[end] for name, end in after.items() if end in inner.dots}))
+    names = [name for name in assignment.after[0] if any([name in found for _, found in ways])]
+    _add_if(assignment, tangent, ways, {name: tangent.dot(name) for name in names if name in tangent.active})
 
 
 def pull_if(assignment: Assignment, adjoint: Adjoint) -> None:
@@ -200,31 +200,28 @@ def pull_if(assignment: Assignment, adjoint: Adjoint) -> None:
     seeds = {name: adjoint.bars[name] for name in assignment.after[0] if name in adjoint.bars}
     if not seeds:
         return
-    inner = [adjoint.inner({after[name]: bar for name, bar in seeds.items()}) for after in assignment.after]
-    for each, part in zip(inner, assignment.parts, strict=True):
-        each.pull(part)
+    ways = []
+    for part, after in zip(assignment.parts, assignment.after, strict=True):
+        inner = adjoint.inner({after[name]: bar for name, bar in seeds.items()})
+        inner.pull(part)
+        ways.append((inner, inner.bars))
     inside = {name for part in assignment.parts for each in part for name in reads_and_writes(each.statement)[1]}
-    names = dict.fromkeys([name for each in inner for name in each.bars if name in adjoint.active])
-    terms = {name: adjoint.bar(name) for name in names if name not in inside}
-    _add_if(assignment, adjoint, inner, [each.bars for each in inner], terms)
+    names = dict.fromkeys([name for _, bars in ways for name in bars if name in adjoint.active and name not in inside])
+    terms = {name: adjoint.bar(name) for name in names}
+    _add_if(assignment, adjoint, ways, terms)
     for name, bar in terms.items():
         adjoint.collect(name, bar)
 
 
 def _add_if(
-    assignment: Assignment,
-    to: Registers,
-    inner: Sequence[Registers],
-    found: Sequence[Mapping[str, str]],
-    ends: Mapping[str, str],
+    assignment: Assignment, to: Registers, ways: Sequence[tuple[Registers, Mapping[str, str]]], ends: Mapping[str, str]
 ) -> None:
-    """Add both branches, at whose ends what each has `found` for a register is in that of `ends`, or else 0."""
-    ways = [
-        (*each.statements, *[copied(of.get(name), end) for name, end in ends.items()])
-        for each, of in zip(inner, found, strict=True)
+    """Add both branches, at whose ends what each has found for a register is in that of `ends`, or else 0."""
+    bodies = [
+        (*inner.statements, *[copied(found.get(name), end) for name, end in ends.items()]) for inner, found in ways
     ]
     if ends:
-        to.add(If(assignment.statement.register, *ways))
+        to.add(If(assignment.statement.register, *bodies))
 
 
 # FixedPoint: linear equations, solved by the iteration itself

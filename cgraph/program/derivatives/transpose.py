@@ -29,6 +29,9 @@ from .jvp import Assignment, Linearized, Numbers, Passes, Product, Registers, no
 HEAVY_GRAPH = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
 TAPE_BLOCK = 4096  # passes in a block of a tape
 Pullback = Callable[[Sequence[Node]], Graph]  # a graph's own rule: cotangents of these inputs, see `cotangent_graph`
+Values = Mapping[str, Array]  # of registers
+Given = Mapping[str, ArrayLike]  # the same, of a user
+Feed = Callable[[int, int], Array]  # what passes first .. last - 1 are fed, (passes, width, N), or one for all
 Pull = Callable[..., tuple[dict[str, Array], dict[str, Array]]]  # see `program_vjp`
 Rules = Mapping[int, tuple[int, Pullback]]  # by the id of a graph; and how many of its first outputs have cotangents
 
@@ -158,9 +161,8 @@ def _along(passes: Passes, made: Registers, vectors: Mapping[str, str], record: 
 class Along:
     """Passes that record, and a program that goes along their record, ready to run.
 
-    results: registers that are read when all passes are done.  more: registers that are recorded besides, after what
-    the linearized program is fed. A pass begins with what the one before handed on, in the registers of `handed` after
-    it: the start is put there.
+    results: registers that are read after all passes.  more: those recorded after what the derivative is fed. A pass
+    begins with what the one before handed on, in the registers of `handed` after it: the start is put there.
     """
 
     def __init__(
@@ -187,20 +189,12 @@ class Block(NamedTuple):
 class Tape:
     """A run of passes, of N memories side by side, with what is recorded for its derivative, in blocks.
 
-    values: {register: (k,), or (k, N), before the first pass}; of those that there are, 0 of others.
-    feed: (first, last) -> what the passes first .. last - 1 are fed, (passes, width, N), or one for all.
-    checkpoints: passes between two memories from which the record is made again; 0: the record is kept.
-    every: record only after each so many passes.
+    values: {register: (k,), or (k, N), before the first pass}, 0 of others.  checkpoints: passes between two memories
+    from which the record is made again; 0: the record is kept.  every: record only after each so many passes.
     """
 
     def __init__(
-        self,
-        of: Along,
-        values: Mapping[str, Array],
-        feed: Callable[[int, int], Array],
-        many: int = 1,
-        checkpoints: int = 0,
-        every: int = 1,
+        self, of: Along, values: Values, feed: Feed, many: int = 1, checkpoints: int = 0, every: int = 1
     ) -> None:
         self.of, self.feed, self.checkpoints, self.every = of, feed, checkpoints, every
         handed = of.passes.handed
@@ -219,18 +213,18 @@ class Tape:
 
     def records(self, *, backwards: bool) -> Iterator[Block]:
         """The blocks with the rows of every pass, (passes, width, N), from the last one back if asked."""
-        for block in reversed(self.blocks) if backwards else self.blocks:
-            first, last, kept = block
+        for first, last, kept in reversed(self.blocks) if backwards else self.blocks:
+            rows = kept
             if self.checkpoints:
                 rows = run_passes(self.of.forward, kept.copy(), last - first, 1, self.feed(first, last))
-            yield Block(first, last, rows) if self.checkpoints else block
+            yield Block(first, last, rows)
 
     def value(self, name: str, memory: Array | None = None) -> Array:
         """A register after the passes, or in other memories of theirs, (k, N)."""
         name = self.of.passes.handed.get(name, name)
         return self.of.forward.read(self.memory if memory is None else memory, name).copy()
 
-    def derivative_memory(self, vectors: Mapping[str, Array], many: int) -> Array:
+    def derivative_memory(self, vectors: Values, many: int) -> Array:
         """Memories of the derivative, with these vectors of the registers that have one."""
         names = self.of.linear.vectors
         values = {name: self.value(name) for name in self.of.passes.constants}
@@ -242,7 +236,7 @@ class Tape:
         read, linear = self.of.derivative.read, self.of.linear
         return {name: read(memory, at).copy() for name, at in linear.vectors.items()}, read(memory, linear.unsolved)[0]
 
-    def cotangents(self, seeds: Mapping[str, Array]) -> tuple[dict[str, Array], Array, Array]:
+    def cotangents(self, seeds: Values) -> tuple[dict[str, Array], Array, Array]:
         """Cotangents before the passes, of those after them; the record, (passes, width, N); and what is unsolved."""
         ready, memory, parts = self.of.derivative, self.derivative_memory(seeds, self.memory.shape[1]), []
         for first, last, rows in self.records(backwards=True):
@@ -260,7 +254,7 @@ def run_passes(ready: Runner, memory: Array, passes: int, every: int, feed: Arra
     return record.rows.reshape(shape)
 
 
-def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
+def _memory(ready: Runner, values: Values, many: int) -> Array:
     """Memories with those of the values, (k, N) or for all (k,), that the program has registers for."""
     memory = ready.memory({}, many)
     for name, numbers in values.items():
@@ -270,13 +264,7 @@ def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
 
 
 def program_vjp(
-    program: Program,
-    of: Sequence[str],
-    wrt: Sequence[str] = (),
-    *,
-    constant: Sequence[str] = (),
-    checkpoints: int = 0,
-    backend: str = "auto",
+    program: Program, of: Sequence[str], wrt: Sequence[str] = (), *, constant: Sequence[str] = (), backend: str = "auto"
 ) -> Pull:
     """Cotangents through any number of passes of a program: J^T y_bar of what its registers hold after the last one.
 
@@ -284,8 +272,7 @@ def program_vjp(
     again.
 
     program, wrt, constant: as for `program_jvp`; what it records does not matter.  of: registers whose values after the
-    last pass are the result.  checkpoints: keep the memory after every so many passes, and record again from there; 0:
-    keep the record of all.  backend: as for `runner`.
+    last pass are the result.  backend: as for `runner`.
     Returns a function `pull(values, passes, seeds, feed=None)` of {register: value before the first pass}, 0 for
     others, the number of passes, {register of `of`: cotangent after the last one}, 0 for others, and the feed, (passes,
     feed_width). It gives {register of `of`: value after the last pass}, and {register: cotangent} of what is handed on
@@ -302,27 +289,21 @@ def program_vjp(
     >>> values["x"].tolist(), bars["x"].tolist(), bars["p"].tolist()
     ([18.0], [9.0], [12.0])
     """
-    passes, kept = Passes(program, of, wrt, constant), require_whole("checkpoints", checkpoints)
-    return partial(_pulled, Along(passes, adjoint(passes, of), of, backend), list(of), kept)
+    passes = Passes(program, of, wrt, constant)
+    return partial(_pulled, Along(passes, adjoint(passes, of), of, backend), list(of))
 
 
 def _pulled(
-    along: Along,
-    of: Sequence[str],
-    checkpoints: int,
-    values: Mapping[str, ArrayLike],
-    passes: int,
-    seeds: Mapping[str, ArrayLike],
-    feed: ArrayLike | None = None,
+    along: Along, of: Sequence[str], values: Given, passes: int, seeds: Given, feed: ArrayLike | None = None
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """See `program_vjp`."""
+    """The function that `program_vjp` returns."""
     rows, lengths = np.empty((require_whole("passes", passes, 1), 0)), along.forward.program.registers
     rows = rows if feed is None else real_array("feed", feed)
     if rows.ndim != 2 or len(rows) != passes:
         raise GraphError(f"the feed needs a row for each of {passes} passes, got shape {rows.shape}")
     own = {name: length for name, length in lengths.items() if along.passes.own not in name}
     start, after = _numbers("values", values, own), _numbers("seeds", seeds, {name: own[name] for name in of})
-    tape = Tape(along, start, lambda first, last: rows[first:last, :, None], checkpoints=checkpoints)
+    tape = Tape(along, start, lambda first, last: rows[first:last, :, None])
     tape.run(0, passes)
     bars, slopes, unsolved = tape.cotangents(after)
     if unsolved[0]:
@@ -334,7 +315,7 @@ def _pulled(
     return {name: tape.value(name)[:, 0] for name in of}, found
 
 
-def _numbers(what: str, values: Mapping[str, ArrayLike], lengths: Lengths) -> dict[str, Array]:
+def _numbers(what: str, values: Given, lengths: Lengths) -> dict[str, Array]:
     """Values of registers as arrays. Raises GraphError for an unknown one, or a value of another length."""
     found = {}
     for name, value in require_mapping(what, values, "register: numbers").items():

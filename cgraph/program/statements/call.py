@@ -158,12 +158,11 @@ def check_call(call: Call, lengths: Lengths) -> None:
 def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
     where, graph, outputs = _text(statement), statement.graph, statement.outputs
-    known = sum([length_of(lengths, where, name) for name in statement.shared])
+    for name in (*statement.shared, *statement.inputs, *outputs):
+        length_of(lengths, where, name)
+    registers = [(statement.inputs, len(graph.inputs) - (known := _total(lengths, statement.shared)))]
     if known > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
-    for name in (*statement.inputs, *outputs):
-        length_of(lengths, where, name)
-    registers = [(statement.inputs, len(graph.inputs) - known)]
     if isinstance(statement, Map):
         registers.append((outputs, len(graph.outputs)))
         for name in statement.asked:

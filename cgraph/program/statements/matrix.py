@@ -6,7 +6,6 @@ last: many matrices side by side, each with pivots of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -112,27 +111,22 @@ def run_scatter(statement: Scatter, state: dict[str, Any], execution: Execution)
 
 def factor_text(statement: Factor, writer: Writer) -> None:
     """Write as machine code."""
-    _call(writer, "lu.factor", _lu_factor_text, statement, statement.matrix, statement.pivots)
+    name, registers = writer.functions.text("lu.factor", _lu_factor_text), (statement.matrix, statement.pivots)
+    writer.call(name, [writer.pointer(register) for register in registers], writer.registers[statement.pivots])
 
 
 def solve_text(statement: Solve, writer: Writer) -> None:
     """Write as machine code."""
     name = "lu.solve.transposed" if statement.transposed else "lu.solve"
-    text = partial(_lu_solve_text, name=name, transposed=statement.transposed)
-    _call(writer, name, text, statement, statement.matrix, statement.pivots, statement.vector)
+    writer.functions.text(name, partial(_lu_solve_text, name=name, transposed=statement.transposed))
+    registers = (statement.matrix, statement.pivots, statement.vector)
+    writer.call(name, [writer.pointer(register) for register in registers], writer.registers[statement.pivots])
 
 
 def scatter_text(statement: Scatter, writer: Writer) -> None:
     """Write as machine code."""
     name = writer.functions.take(statement.table, statement.places)
     writer.call(name, [writer.pointer(statement.source), writer.pointer(statement.target)])
-
-
-def _call(
-    writer: Writer, name: str, text: Callable[[Arithmetic], list[str]], statement: Factor | Solve, *registers: str
-) -> None:
-    pointers = [writer.pointer(register) for register in registers]
-    writer.call(writer.functions.text(name, text), pointers, writer.registers[statement.pivots])
 
 
 def _largest(a: Array, k: int) -> Any:
