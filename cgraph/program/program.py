@@ -11,7 +11,7 @@ from ..core.graph import Graph
 from ..util.explain_failure import explain_failure
 from . import table  # noqa: F401 (which fills the table)
 from .listing import Listing
-from .statement import Statement, bodies_of, length_of, names_in, reads_and_writes, require_length, require_once, row_of
+from .statement import Statement, bodies_of, length_of, names_in, require_length, require_once, row_of
 from .statements.call import Call
 
 
@@ -55,12 +55,12 @@ class Program:
             if (number := getattr(self, what)) is not None:
                 require_length(self.registers, what, number, 1)
         for statement in self.statements():
-            row = row_of(statement)
+            row, kind = row_of(statement), type(statement).__name__
+            for name in names_in(statement, (*row.reads, *row.writes)):
+                length_of(self.registers, kind, name)
+            require_once(kind, names_in(statement, row.writes))
             if row.check is not None:
                 row.check(statement, self.registers)
-            for names in reads_and_writes(statement):
-                for name in names:
-                    length_of(self.registers, type(statement).__name__, name)
 
     def statements(self) -> Iterator[Statement]:
         """Every statement, outer before inner."""
@@ -141,10 +141,7 @@ def outliving(program: Program) -> list[str]:
 
 
 def live_registers(statements: Sequence[Statement], read: Set[str], after: dict[int, Set[str]]) -> Set[str]:
-    """The registers whose numbers before the statements matter, where those of `read` matter behind them.
-
-    after: receives, by the id of each statement with bodies, those that matter behind any of its bodies.
-    """
+    """Registers that matter before statements, if `read` do behind; `after` gets those behind bodies, by their ids."""
     live = set(read)
     for statement in reversed(statements):
         row, bodies = row_of(statement), bodies_of(statement)

@@ -220,12 +220,7 @@ class Passes(Registers):
         return tangent, dots
 
     def program(
-        self,
-        made: Registers,
-        body: Sequence[Statement],
-        record: Sequence[str],
-        feed: Sequence[str],
-        more: Iterable[str],
+        self, made: Registers, body: list[Statement], record: Sequence[str], feed: Sequence[str], more: Iterable[str]
     ) -> Program:
         """The program of a body, with those registers of `made` that it uses, and more."""
         names = {name for statement in body for names in reads_and_writes(statement) for name in names}

@@ -277,10 +277,7 @@ def pull_fixed_point(assignment: Assignment, adjoint: Adjoint) -> None:
 def _add_settled(
     rows: Sequence[tuple[str, str | None, str | None]], turn: Sequence[Statement], registers: Registers
 ) -> None:
-    """Add u = v + A u for all rows (u, v, the result of A u that a turn leaves), to rounding; None is zero.
-
-    Changes of registers are measured by their sizes, so that units do not matter.
-    """
+    """Add u = v + A u for all rows (u, v, the result of A u that a turn leaves), to rounding; None is zero."""
     going, turns, stalled, old, total, change, size = [
         registers.fresh(name, 1) for name in ("going", "turns", "stalled", "change_old", "change", "d", "s")
     ]

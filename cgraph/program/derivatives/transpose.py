@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +29,7 @@ HEAVY_GRAPH = 4  # operations of a graph for each of its outputs, from which on 
 TAPE_BLOCK = 4096  # passes in a block of a tape
 Pullback = Callable[[Sequence[Node]], Graph]  # a graph's own rule: cotangents of these inputs, see `cotangent_graph`
 Values = Mapping[str, Array]  # of registers
+Block = tuple[int, int, Array]  # passes first .. last - 1, and the rows of their record, or the memory before them
 Given = Mapping[str, ArrayLike]  # the same, of a user
 Feed = Callable[[int, int], Array]  # what passes first .. last - 1 are fed, (passes, width, N), or one for all
 Pull = Callable[..., tuple[dict[str, Array], dict[str, Array]]]  # see `program_vjp`
@@ -40,10 +40,7 @@ Rules = Mapping[int, tuple[int, Pullback]]  # by the id of a graph; and how many
 def cotangent_graph(
     graph: Graph, rule: Pullback | None, inputs: Numbers, wanted: Numbers, outputs: Numbers, seeded: Numbers
 ) -> Product:
-    """Cotangents of the inputs `wanted` from those of the outputs `seeded`. Inputs of the graph: its own, cotangents.
-
-    rule: one of the graph's own, whose graph has the values of all outputs for inputs, too, before the cotangents.
-    """
+    """Cotangents of the inputs `wanted`, over the graph's inputs, by a rule also its outputs, and those of `seeded`."""
     groups = split(graph.inputs, inputs)
     by = [node for k in wanted for node in groups[k]]
     if rule is None:
@@ -57,14 +54,11 @@ def cotangent_graph(
 
 @dataclass
 class Adjoint(Registers):
-    """The statements that pull cotangents back through assignments.
-
-    bars: {register: the one that has its cotangent}; of what comes after, these stay as they are.  rules: of graphs.
-    """
+    """The statements that pull cotangents back through assignments.  bars: {register: the one of its cotangent}."""
 
     bars: dict[str, str]
     rules: Rules
-    _after: frozenset[str] = field(init=False)
+    _after: frozenset[str] = field(init=False)  # of what comes after the assignments, which stay as they are
 
     def __post_init__(self) -> None:
         self._after = frozenset(self.bars.values())
@@ -93,10 +87,7 @@ class Adjoint(Registers):
 
 
 def _recovery(assignments: Sequence[Assignment], values: Iterable[str]) -> tuple[list[Statement], list[str], set[str]]:
-    """How values that assignments computed come back: statements, registers of a record, and what both begin with.
-
-    Results of heavy statements are recorded, others are made again.
-    """
+    """Statements that compute values again, registers of a record of heavy ones, and what both begin with."""
     wanted, tape, again = set(values), dict[str, None](), list[Statement]()
     for assignment in reversed(assignments):
         run = assignment.statements
@@ -119,10 +110,7 @@ def _is_heavy(statement: Statement) -> bool:
 
 
 def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyType({})) -> Linearized:
-    """A pass that pulls cotangents back, of what it hands on, `seeds` among it, and of its inputs.
-
-    It is fed what was recorded, the last pass first, and records the cotangents of `varied`.
-    """
+    """A pass, fed the record backwards, that pulls cotangents of `seeds` and inputs; it records those of `varied`."""
     handed, outer = passes.handed, Adjoint(dict(passes.lengths), passes.own, passes.active, {}, rules)
     bars: dict[str, str] = {}
     more = [*dict.fromkeys(seeds)]
@@ -140,10 +128,7 @@ def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyTyp
 
 
 def tangent(passes: Passes, record: Sequence[str], then: Sequence[Statement] = ()) -> Linearized:
-    """A pass that pushes tangents on, fed what was recorded; it records those of `record`.
-
-    then: what else it does with the tangents, {name}:dot.
-    """
+    """A pass, fed the record, that pushes tangents, {name}:dot, and then runs more; it records those of `record`."""
     made, dots = passes.tangents()
     made.add(*then)
     return _along(passes, made, dots, [dots[name] for name in record])
@@ -178,14 +163,6 @@ class Along:
         self.forward, self.derivative = runner(forward, backend), runner(linear.program, backend)
 
 
-class Block(NamedTuple):
-    """Passes first .. last - 1, and what is kept of them: the rows of their record, or the memory before them."""
-
-    first: int
-    last: int
-    kept: Array
-
-
 class Tape:
     """A run of passes, of N memories side by side, with what is recorded for its derivative, in blocks.
 
@@ -209,7 +186,7 @@ class Tape:
             before = self.memory.copy() if self.checkpoints else None
             part = last - first if self.checkpoints else self.every
             rows = run_passes(self.of.forward, self.memory, last - first, part, self.feed(first, last))
-            self.blocks.append(Block(first, last, rows if before is None else before))
+            self.blocks.append((first, last, rows if before is None else before))
 
     def records(self, *, backwards: bool) -> Iterator[Block]:
         """The blocks with the rows of every pass, (passes, width, N), from the last one back if asked."""
@@ -217,7 +194,7 @@ class Tape:
             rows = kept
             if self.checkpoints:
                 rows = run_passes(self.of.forward, kept.copy(), last - first, 1, self.feed(first, last))
-            yield Block(first, last, rows)
+            yield first, last, rows
 
     def value(self, name: str, memory: Array | None = None) -> Array:
         """A register after the passes, or in other memories of theirs, (k, N)."""

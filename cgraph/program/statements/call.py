@@ -17,7 +17,7 @@ from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...core.node import Node
 from ...writing.naming import variables
-from ..statement import Execution, Lengths, Names, Statement, length_of, require_length, require_once
+from ..statement import Execution, Lengths, Names, Statement, require_length
 
 if TYPE_CHECKING:
     from ..writer import Writer
@@ -149,26 +149,27 @@ def _text(statement: Call | Map | Sum) -> str:
 
 def check_call(call: Call, lengths: Lengths) -> None:
     """Raises GraphError if the registers do not hold as many numbers as the graph has inputs and outputs."""
-    where = _text(call)
-    _require_total(where, lengths, "inputs", call.inputs, len(call.graph.inputs))
-    _require_total(where, lengths, "outputs", call.outputs, len(call.graph.outputs))
-    require_once(where, call.outputs)
+    _require_total(call, lengths, "inputs", call.inputs, len(call.graph.inputs))
+    _require_total(call, lengths, "outputs", call.outputs, len(call.graph.outputs))
 
 
 def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
-    where, graph, outputs = _text(statement), statement.graph, statement.outputs
-    for name in (*statement.shared, *statement.inputs, *outputs):
-        length_of(lengths, where, name)
-    registers = [(statement.inputs, len(graph.inputs) - (known := _total(lengths, statement.shared)))]
+    where, graph, outputs, known = (
+        _text(statement),
+        statement.graph,
+        statement.outputs,
+        _total(lengths, statement.shared),
+    )
     if known > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
+    registers = [(statement.inputs, len(graph.inputs) - known)]
     if isinstance(statement, Map):
         registers.append((outputs, len(graph.outputs)))
         for name in statement.asked:
             require_length(lengths, where, name, 1)
     else:
-        _require_total(where, lengths, "outputs", outputs, len(graph.outputs))
+        _require_total(statement, lengths, "outputs", outputs, len(graph.outputs))
     count = elements(statement, lengths)
     for names, wanted in registers:
         of_each = sizes(statement, lengths, names)
@@ -177,12 +178,11 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
         for name, size in zip(names, of_each, strict=True):
             if lengths[name] != count * size and (lengths[name] != 1 or names is outputs):
                 raise GraphError(f"{where}: register {name!r} needs length {count} or 1, got {lengths[name]}")
-    require_once(where, outputs)
 
 
-def _require_total(where: str, lengths: Lengths, what: str, names: Names, wanted: int) -> None:
-    if (total := sum([length_of(lengths, where, name) for name in names])) != wanted:
-        raise GraphError(f"{where} needs {wanted} {what}, the registers {', '.join(names)} hold {total}")
+def _require_total(statement: Call | Sum, lengths: Lengths, what: str, names: Names, wanted: int) -> None:
+    if (total := _total(lengths, names)) != wanted:
+        raise GraphError(f"{_text(statement)} needs {wanted} {what}, the registers {', '.join(names)} hold {total}")
 
 
 def run_call(call: Call, state: State, execution: Execution) -> None:

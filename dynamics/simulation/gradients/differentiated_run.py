@@ -183,7 +183,7 @@ class DifferentiatedRun:
         tape, count, m = segment.tape, len(segment.steps.h), len(segment.x)
         if tape.checkpoints:
             kept = [tape.value("x", memory) for *_, memory in tape.blocks]
-            return np.array([*[block.first for block in tape.blocks], count]), np.array([*kept, segment.x])
+            return np.array([*[first for first, *_ in tape.blocks], count]), np.array([*kept, segment.x])
         numbers = [np.arange(first + tape.every, last + 1, tape.every) for first, last, _ in tape.blocks]
         rows = [kept[:, -m:] for *_, kept in tape.blocks]
         if not len(numbers[-1]) or numbers[-1][-1] != count:
@@ -274,7 +274,7 @@ class DifferentiatedRun:
         vectors = {"x": dots[:m], "t": dots[m : m + 1], **self.motions.equations.registers(dots[m + 1 :])}
         if start is not None:
             memory = start.derivative_memory(vectors, many)
-            _run_all(start.of.derivative, memory, next(start.records(backwards=False)).kept)
+            _run_all(start.of.derivative, memory, next(start.records(backwards=False))[2])
             found, failed = start.vectors(memory)
             self._require_solved(failed)
             vectors |= found

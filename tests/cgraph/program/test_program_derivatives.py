@@ -294,8 +294,8 @@ def test_tangents_along_a_tape_are_those_beside_the_values(seed: int) -> None:
     memory, vectors = tape.derivative_memory(along_dots, 1), ready.linear.vectors
     for k in range(PASSES):
         ready.derivative.write(memory, vectors["f"], feed_along[k][:, None])
-        (block,) = tape.records(backwards=False)
-        dots = run_passes(ready.derivative, memory, 1, 1, block.kept[k : k + 1])[0, :, 0]
+        ((_, _, rows),) = tape.records(backwards=False)
+        dots = run_passes(ready.derivative, memory, 1, 1, rows[k : k + 1])[0, :, 0]
     moved = program_jvp(program, [*START, "f"], constant=["turns"])
     beside = runner(moved.program, "python")
     known = {moved.vectors[name]: along_dots[name] for name in START if name in moved.vectors}
