@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from ...autodiff.products import jvp
 from ...core.checks import GraphError
@@ -18,7 +18,6 @@ from ..program import Program, unused_sign
 from ..statement import Names, Statement, effects, length_of, names_in, reads_and_writes, row_of, with_names
 from ..statements.call import Map, copied
 
-T = TypeVar("T")
 Numbers = tuple[int, ...]
 Product = tuple[Graph | None, Numbers]  # of J x_dot or J^T y_bar, none where all is 0, and which results it has
 
@@ -95,7 +94,7 @@ class Registers:
         self.statements += statements
 
 
-def split(items: Sequence[T], lengths: Sequence[int]) -> list[Sequence[T]]:
+def split(items: Sequence[Any], lengths: Sequence[int]) -> list[Sequence[Any]]:
     """The items, end to end, by the registers that hold them."""
     ends = list(itertools.accumulate(lengths, initial=0))
     return [items[start:end] for start, end in itertools.pairwise(ends)]

@@ -121,13 +121,9 @@ def push_solve(assignment: Assignment, tangent: Tangent) -> None:
     if matrix is None and side is None:
         return
     dot = tangent.dot(solve.vector)
-    if side is None:
-        side = tangent.fresh(right, n)
-        tangent.add(copied(None, side))
-    if matrix is None:
-        tangent.add(copied(side, dot))
-    else:
-        tangent.add(Call(_less_product(n, solve.transposed), (side, matrix, solve.vector), (dot,)))
+    tangent.add(copied(side, dot))
+    if matrix is not None:
+        tangent.add(Call(_less_product(n, solve.transposed), (dot, matrix, solve.vector), (dot,)))
     tangent.add(Solve(solve.matrix, solve.pivots, dot, solve.transposed))  # x_dot = A^-1 (b_dot - A_dot x)
 
 
@@ -202,7 +198,7 @@ def pull_if(assignment: Assignment, adjoint: Adjoint) -> None:
         return
     ways = []
     for part, after in zip(assignment.parts, assignment.after, strict=True):
-        inner = adjoint.inner({after[name]: bar for name, bar in seeds.items()})
+        inner = replace(adjoint, bars={after[name]: bar for name, bar in seeds.items()})
         inner.pull(part)
         ways.append((inner, inner.bars))
     inside = {name for part in assignment.parts for each in part for name in reads_and_writes(each.statement)[1]}
@@ -265,7 +261,7 @@ def pull_fixed_point(assignment: Assignment, adjoint: Adjoint) -> None:
     if not outer:
         return
     turning = {name: adjoint.bar(name) for name in assignment.carried if name in adjoint.active}
-    inner = adjoint.inner({after[name]: bar for name, bar in {**outer, **turning}.items()})
+    inner = replace(adjoint, bars={after[name]: bar for name, bar in {**outer, **turning}.items()})
     inner.pull(turn)
     rows = [(bar, outer.get(name), inner.bars.get(name)) for name, bar in turning.items()]
     _add_settled(rows, inner.statements, adjoint)

@@ -63,10 +63,6 @@ class Adjoint(Registers):
     def __post_init__(self) -> None:
         self._after = frozenset(self.bars.values())
 
-    def inner(self, bars: Mapping[str, str]) -> Adjoint:
-        """Adjoint of a body, from cotangents of its end."""
-        return replace(self, bars=dict(bars))
-
     def pull(self, assignments: Sequence[Assignment]) -> None:
         """Through these assignments, the last first."""
         for assignment in reversed(assignments):
@@ -116,7 +112,7 @@ def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyTyp
     more = [*dict.fromkeys(seeds)]
     while True:  # until there are those of all registers that these come from
         bars |= {name: outer.bar(name) for name in more}
-        inner = outer.inner({handed[name]: bar for name, bar in bars.items()})
+        inner = replace(outer, bars={handed[name]: bar for name, bar in bars.items()})
         inner.pull(passes.plain)
         more = [name for name in handed if name in inner.bars and name not in bars and name in passes.active]
         if not more:
@@ -183,10 +179,9 @@ class Tape:
         size = self.checkpoints or max(1, TAPE_BLOCK // self.every) * self.every
         for first in range(begin, end, size):
             last = min(first + size, end)
-            before = self.memory.copy() if self.checkpoints else None
-            part = last - first if self.checkpoints else self.every
+            before, part = self.memory.copy(), last - first if self.checkpoints else self.every
             rows = run_passes(self.of.forward, self.memory, last - first, part, self.feed(first, last))
-            self.blocks.append((first, last, rows if before is None else before))
+            self.blocks.append((first, last, before if self.checkpoints else rows))
 
     def records(self, *, backwards: bool) -> Iterator[Block]:
         """The blocks with the rows of every pass, (passes, width, N), from the last one back if asked."""
@@ -244,9 +239,6 @@ def program_vjp(
     program: Program, of: Sequence[str], wrt: Sequence[str] = (), *, constant: Sequence[str] = (), backend: str = "auto"
 ) -> Pull:
     """Cotangents through any number of passes of a program: J^T y_bar of what its registers hold after the last one.
-
-    The passes record the results of their heavy graphs and what they begin with; on the way back the rest is computed
-    again.
 
     program, wrt, constant: as for `program_jvp`; what it records does not matter.  of: registers whose values after the
     last pass are the result.  backend: as for `runner`.

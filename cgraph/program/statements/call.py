@@ -155,13 +155,8 @@ def check_call(call: Call, lengths: Lengths) -> None:
 
 def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
-    where, graph, outputs, known = (
-        _text(statement),
-        statement.graph,
-        statement.outputs,
-        _total(lengths, statement.shared),
-    )
-    if known > len(graph.inputs):
+    where, graph, outputs = _text(statement), statement.graph, statement.outputs
+    if (known := _total(lengths, statement.shared)) > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
     registers = [(statement.inputs, len(graph.inputs) - known)]
     if isinstance(statement, Map):
@@ -192,12 +187,12 @@ def run_call(call: Call, state: State, execution: Execution) -> None:
 
 def run_map(statement: Map, state: State, execution: Execution) -> None:
     """Run in Python, element by element; as one batch where registers are arrays, or hold several numbers of each."""
-    lengths = execution.lengths
+    lengths, at = execution.lengths, 0
     if not several(statement, lengths) and isinstance(state[statement.outputs[0]], list):
         columns = zip(*_rows(statement, state, execution), strict=True)
         state.update(zip(statement.outputs, map(list, columns), strict=False))
         return
-    count, at = elements(statement, lengths), 0
+    count = elements(statement, lengths)
     for name in statement.asked:
         count = int(min(max(1.0, state[name][0]), count))
     results = _at_once(statement, state, (count,), execution)
