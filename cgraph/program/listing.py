@@ -33,10 +33,10 @@ class Listing:
 
     def registers(self) -> list[str]:
         """The registers of each length."""
-        by_length: dict[int, list[str]] = {}
-        for name, length in self._lengths.items():
-            by_length.setdefault(length, []).append(name)
-        rows = [f"{counted(length, 'number')}: {', '.join(by_length[length])}" for length in sorted(by_length)]
+        rows = []
+        for length in sorted({*self._lengths.values()}):
+            names = [name for name in self._lengths if self._lengths[name] == length]
+            rows.append(f"{counted(length, 'number')}: {', '.join(names)}")
         return [line for row in rows for line in wrap(row, LINE, subsequent_indent="    ")]
 
     def body(self, statements: Sequence[Statement], indent: str = "    ") -> list[str]:
@@ -74,21 +74,20 @@ class Listing:
         if formulas and max(map(len, formulas.values())) <= WIDE:
             return [f"{target} = {formula}" for target, formula in formulas.items()]
         name = self._called.setdefault(id(graph), f"f{len(self._called) + self._first}")
-        shared = () if isinstance(statement, Call) else statement.shared
-        call = f"{name}({', '.join((*shared, *statement.inputs))})"
+        call = f"{name}({', '.join(names_in(statement, row_of(statement).reads))})"
         if not isinstance(statement, Call):
             call = f"{'sum of ' if isinstance(statement, Sum) else ''}{call} for each element"
         return [f"{', '.join(statement.outputs)} = {call}  # {counted(size, 'operation')}"]
 
     def _formulas(self, statement: Call | Map | Sum) -> dict[str, str]:
         """{register, or one of its numbers: formula}; none where a line would read what one above it writes."""
-        graph, names = statement.graph, statement.inputs
+        graph = statement.graph
         if isinstance(statement, Call):
-            sources = self._numbers(names)
+            sources = self._numbers(statement.inputs)
         elif several(statement, self._lengths):
             return {}
         else:  # register by register, as in NumPy
-            sources = [*self._numbers(statement.shared), *names]
+            sources = [*self._numbers(statement.shared), *statement.inputs]
         targets = list(statement.outputs) if isinstance(statement, Map) else self._numbers(statement.outputs)
         texts = {node: (name, LEAF) for node, name in zip(graph.inputs, sources, strict=True)}
         reads = {node: {name} for node, name in zip(graph.inputs, sources, strict=True)}
@@ -107,11 +106,8 @@ class Listing:
 
     def _numbers(self, names: Names) -> list[str]:
         """The numbers of registers, end to end."""
-        return [
-            name if length == 1 else f"{name}[{k}]"
-            for name, length in [(name, self._lengths[name]) for name in names]
-            for k in range(length)
-        ]
+        sizes = [(name, self._lengths[name]) for name in names]
+        return [name if length == 1 else f"{name}[{k}]" for name, length in sizes for k in range(length)]
 
 
 def _number(value: float) -> Text:

@@ -23,8 +23,7 @@ def many(program: Program, kept: Iterable[str] | None = None) -> Program:
     are taken before. Registers for masks, and for what is put back, stand after those of the program. `Runner.run`
     makes it of N memories.
 
-    kept: registers that are put back whether something reads them later or not, besides those that outlive a pass; by
-    default all.
+    kept: registers that are put back even if nothing reads them later in a pass; by default all.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, While, many
@@ -83,10 +82,9 @@ class _Masked:
 
     def _loop(self, statement: While | FixedPoint) -> None:
         """Add turns in the lanes that still go on."""
-        going = self._register("going")
-        graph = _GOING_IN_MASK if self.mask else _GOING
-        self.statements.append(Call(graph, (statement.register, *self.mask), (going,)))
+        going, graph = self._register("going"), _GOING_IN_MASK if self.mask else _GOING
         turn = self._body(statement, statement.body, going)
+        self.statements.append(Call(graph, (statement.register, *self.mask), (going,)))
         self.statements.append(While(going, (*turn, Call(_GOING_IN_MASK, (statement.register, going), (going,)))))
 
     def _body(self, statement: Statement, statements: Sequence[Statement], mask: str) -> tuple[Statement, ...]:

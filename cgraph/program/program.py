@@ -112,8 +112,7 @@ class Program:
 
     def graphs(self) -> list[Graph]:
         """The graphs that statements run, each once."""
-        named = [(statement, row_of(statement).graph) for statement in self.statements()]
-        graphs = [getattr(statement, name) for statement, name in named if name]
+        graphs = [getattr(statement, name) for statement in self.statements() if (name := row_of(statement).graph)]
         return list({id(graph): graph for graph in graphs}.values())
 
 

@@ -33,18 +33,13 @@ def rule_of(statement: Statement, column: str) -> Callable[..., Any]:
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """A statement whose outputs no other one writes; `copies` first copy what it changes in place.
+    """A statement whose outputs no other one writes; `copies` first copy what it changes in place."""
 
-    parts: its bodies in single assignment, which no other runs; of an iteration one turn more.
-    after: for each part, {register that the statement writes: the one that has its value at the end of the part}.
-    carried: of an iteration, the registers that a turn reads before it writes them.
-    """
-
-    statement: Any  # of the kind that the rule is for
+    statement: Any  # of the kind that a rule is for
     copies: tuple[Map, ...] = ()
-    parts: tuple[tuple[Assignment, ...], ...] = ()
-    after: tuple[Mapping[str, str], ...] = ()
-    carried: Names = ()
+    parts: tuple[tuple[Assignment, ...], ...] = ()  # its bodies; of an iteration one turn more, which no pass runs
+    after: tuple[Mapping[str, str], ...] = ()  # of each part, {register written: the one of its value at the end}
+    carried: Names = ()  # of an iteration, the registers that a turn reads before it writes them
 
     @property
     def statements(self) -> tuple[Statement, ...]:
@@ -135,15 +130,11 @@ class Tangent(Registers):
 
 
 class Linearized(NamedTuple):
-    """A program of tangents or cotangents.
-
-    vectors: {register of a value: that of its tangent or cotangent, before and after a pass}.
-    unsolved: a register that is not 0 after passes in which equations of a `FixedPoint` were not solved.
-    """
+    """A program of tangents or cotangents."""
 
     program: Program
-    vectors: Mapping[str, str]
-    unsolved: str
+    vectors: Mapping[str, str]  # {register of a value: that of its tangent or cotangent, before and after a pass}
+    unsolved: str  # a register that is not 0 after passes in which equations of a `FixedPoint` were not solved
 
 
 class Passes(Registers):
@@ -200,8 +191,7 @@ class Passes(Registers):
         """The statement in single assignment, after those before it."""
         row = row_of(statement)
         if row.bodies:
-            made: Assignment = rule_of(statement, "assign")(statement, self)
-            return made
+            return rule_of(statement, "assign")(statement, self)  # type: ignore[no-any-return]
         before = {name: self.now(name) for name in names_in(statement, row.reads)}
         new = with_names(statement, [each for each in row.reads if each not in row.writes], self.now)
         new = with_names(new, row.writes, self.write)

@@ -20,11 +20,9 @@ from .transpose import Adjoint, cotangent_graph
 MOST_TURNS = 200.0
 STALLS = 3.0  # turns whose change is no smaller than before: the rest is rounding
 
-# Call, Map, Sum: a call is one element
-
 
 def _parts(assignment: Assignment, lengths: Mapping[str, int]) -> tuple[Names, Numbers, Numbers]:
-    """The shared registers, and how many numbers each input and output has of an element."""
+    """The shared registers, and how many numbers each input and output has of an element; a call is one."""
     statement = assignment.statement
     inputs, outputs = (tuple([lengths[name] for name in names]) for names in (statement.inputs, statement.outputs))
     if isinstance(statement, Call):
@@ -97,11 +95,8 @@ def pull_elements(assignment: Assignment, adjoint: Adjoint) -> None:
         adjoint.collect(names[k], bar)
 
 
-# Factor, Solve: the tangent, and the cotangent, of a factored matrix are those of the matrix A itself
-
-
 def push_factor(assignment: Assignment, tangent: Tangent) -> None:
-    """The tangent of the factors is A_dot."""
+    """The tangent of the factors is that of the matrix itself, A_dot."""
     (before,), factor = assignment.sources, assignment.statement
     if before in tangent.dots and factor.matrix in tangent.active:
         tangent.dots[factor.matrix] = tangent.dots[before]
@@ -159,11 +154,8 @@ def _outer(n: int) -> Graph:
     return Graph([*a, *b], {f"{i}_{j}": -a[i] * b[j] for i in range(n) for j in range(n)})
 
 
-# If: both bodies go from the same registers on; what one of them writes is copied at the end of both
-
-
 def assign_if(statement: If, passes: Passes) -> Assignment:
-    """Assignment of both bodies."""
+    """Both bodies from the same registers on; what one of them writes is copied at the end of both."""
     decides, before, parts, ends = passes.now(statement.register), dict(passes.current), [], []
     writes = list(dict.fromkeys([*effects(statement.body)[1], *effects(statement.otherwise)[1]]))
     for body in (statement.body, statement.otherwise):
@@ -213,14 +205,9 @@ def _add_if(
     assignment: Assignment, to: Registers, ways: Sequence[tuple[Registers, Mapping[str, str]]], ends: Mapping[str, str]
 ) -> None:
     """Add both branches, at whose ends what each has found for a register is in that of `ends`, or else 0."""
-    bodies = [
-        (*inner.statements, *[copied(found.get(name), end) for name, end in ends.items()]) for inner, found in ways
-    ]
+    bodies = [(*made.statements, *[copied(found.get(name), end) for name, end in ends.items()]) for made, found in ways]
     if ends:
         to.add(If(assignment.statement.register, *bodies))
-
-
-# FixedPoint: linear equations, solved by the iteration itself
 
 
 def assign_fixed_point(statement: FixedPoint, passes: Passes) -> Assignment:
@@ -274,9 +261,8 @@ def _add_settled(
     rows: Sequence[tuple[str, str | None, str | None]], turn: Sequence[Statement], registers: Registers
 ) -> None:
     """Add u = v + A u for all rows (u, v, the result of A u that a turn leaves), to rounding; None is zero."""
-    going, turns, stalled, old, total, change, size = [
-        registers.fresh(name, 1) for name in ("going", "turns", "stalled", "change_old", "change", "d", "s")
-    ]
+    names = ("going", "turns", "stalled", "change_old", "change", "d", "s")
+    going, turns, stalled, old, total, change, size = [registers.fresh(name, 1) for name in names]
     body: list[Statement] = [*turn, Call(Graph([], {"zero": 0.0}), (), (total,))]
     registers.add(*[copied(v, u) for u, v, _ in rows])
     for u, v, result in rows:

@@ -32,7 +32,6 @@ Values = Mapping[str, Array]  # of registers
 Block = tuple[int, int, Array]  # passes first .. last - 1, and the rows of their record, or the memory before them
 Given = Mapping[str, ArrayLike]  # the same, of a user
 Feed = Callable[[int, int], Array]  # what passes first .. last - 1 are fed, (passes, width, N), or one for all
-Pull = Callable[..., tuple[dict[str, Array], dict[str, Array]]]  # see `program_vjp`
 Rules = Mapping[int, tuple[int, Pullback]]  # by the id of a graph; and how many of its first outputs have cotangents
 
 
@@ -99,17 +98,15 @@ def _recovery(assignments: Sequence[Assignment], values: Iterable[str]) -> tuple
 
 
 def _is_heavy(statement: Statement) -> bool:
-    if not isinstance(statement, Call):
-        return bool(row_of(statement).bodies)
-    graph = statement.graph
-    return sum(1 for node in graph.nodes if node.args) > HEAVY_GRAPH * len(graph.outputs)
+    if isinstance(statement, Call):
+        return sum([1 for node in statement.graph.nodes if node.args]) > HEAVY_GRAPH * len(statement.graph.outputs)
+    return bool(row_of(statement).bodies)
 
 
 def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyType({})) -> Linearized:
     """A pass, fed the record backwards, that pulls cotangents of `seeds` and inputs; it records those of `varied`."""
     handed, outer = passes.handed, Adjoint(dict(passes.lengths), passes.own, passes.active, {}, rules)
-    bars: dict[str, str] = {}
-    more = [*dict.fromkeys(seeds)]
+    bars, more = dict[str, str](), [*dict.fromkeys(seeds)]
     while True:  # until there are those of all registers that these come from
         bars |= {name: outer.bar(name) for name in more}
         inner = replace(outer, bars={handed[name]: bar for name, bar in bars.items()})
@@ -142,8 +139,8 @@ def _along(passes: Passes, made: Registers, vectors: Mapping[str, str], record: 
 class Along:
     """Passes that record, and a program that goes along their record, ready to run.
 
-    results: registers that are read after all passes.  more: those recorded after what the derivative is fed. A pass
-    begins with what the one before handed on, in the registers of `handed` after it: the start is put there.
+    results: registers that are read after all passes.  more: those recorded after what the derivative is fed. The start
+    is put in the registers of `handed` after a pass, where each pass begins.
     """
 
     def __init__(
@@ -170,9 +167,9 @@ class Tape:
         self, of: Along, values: Values, feed: Feed, many: int = 1, checkpoints: int = 0, every: int = 1
     ) -> None:
         self.of, self.feed, self.checkpoints, self.every = of, feed, checkpoints, every
-        handed = of.passes.handed
-        self.memory = _memory(of.forward, {handed.get(name, name): value for name, value in values.items()}, many)
-        self.first, self.blocks = self.memory.copy(), list[Block]()
+        start = {of.passes.handed.get(name, name): value for name, value in values.items()}
+        self.memory, self.blocks = _memory(of.forward, start, many), list[Block]()
+        self.first = self.memory.copy()
 
     def run(self, begin: int, end: int) -> None:
         """Passes begin .. end - 1."""
@@ -237,7 +234,7 @@ def _memory(ready: Runner, values: Values, many: int) -> Array:
 
 def program_vjp(
     program: Program, of: Sequence[str], wrt: Sequence[str] = (), *, constant: Sequence[str] = (), backend: str = "auto"
-) -> Pull:
+) -> Callable[..., tuple[dict[str, Array], dict[str, Array]]]:
     """Cotangents through any number of passes of a program: J^T y_bar of what its registers hold after the last one.
 
     program, wrt, constant: as for `program_jvp`; what it records does not matter.  of: registers whose values after the
