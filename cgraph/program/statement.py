@@ -76,9 +76,10 @@ def register_statement(row: StatementRow) -> None:
 
 def row_of(statement: Statement) -> StatementRow:
     """Row of a statement. Raises TypeError for what is no statement of the table."""
-    if type(statement) not in STATEMENTS:
-        raise TypeError(f"{statement!r:.60} is no statement of the table, see register_statement")
-    return STATEMENTS[type(statement)]
+    try:
+        return STATEMENTS[type(statement)]
+    except KeyError:
+        raise TypeError(f"{statement!r:.60} is no statement of the table, see register_statement") from None
 
 
 @dataclass(frozen=True)

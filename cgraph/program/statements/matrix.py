@@ -129,12 +129,16 @@ def scatter_text(statement: Scatter, writer: Writer) -> None:
     writer.call(name, [writer.pointer(statement.source), writer.pointer(statement.target)])
 
 
-def _largest(a: Array, k: int) -> Array:
+def _largest(a: Array, k: int) -> Any:
     """argmax over i >= k of |a[i, k]|, in every lane: not NumPy's, since a NaN must not win, as in machine code."""
-    row, best = np.full(a.shape[2:], k), abs(a[k, k])
+    row: Any = k
+    best = abs(a[k, k])
     for i in range(k + 1, len(a)):
-        larger = abs(a[i, k]) > best
-        row, best = np.where(larger, i, row), np.where(larger, abs(a[i, k]), best)
+        size = abs(a[i, k])
+        if a.ndim > 2:
+            row, best = np.where(size > best, i, row), np.where(size > best, size, best)
+        elif size > best:
+            row, best = i, size
     return row
 
 
