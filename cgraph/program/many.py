@@ -14,7 +14,7 @@ from .statements.call import Call, Map, copied
 from .statements.control import FixedPoint, If, While
 
 
-def many(program: Program, kept: Iterable[str] | None = None) -> Program:
+def many(program: Program) -> Program:
     """The program with its branches and loops under masks, for memories side by side.
 
     What its `If` and `While` decide by is 1 where they apply and else 0, and what they write is put back where they do
@@ -22,8 +22,6 @@ def many(program: Program, kept: Iterable[str] | None = None) -> Program:
     run if any lane is positive, and a `While` as long as any is; a `FixedPoint` becomes a `While`, so that derivatives
     are taken before. Registers for masks, and for what is put back, stand after those of the program. `Runner.run`
     makes it of N memories.
-
-    kept: registers that are put back even if nothing reads them later in a pass; by default all.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, While, many
@@ -35,10 +33,15 @@ def many(program: Program, kept: Iterable[str] | None = None) -> Program:
     """
     if not isinstance(program, Program):
         raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
+    return many_keeping(program, program.registers)
+
+
+def many_keeping(program: Program, kept: Iterable[str]) -> Program:
+    """`many`, but what is neither kept nor outlives a pass is put back only where something reads it."""
     if not any([row_of(each).bodies for each in program.statements()]):
         return program
     lengths, after = dict(program.registers), dict[int, Set[str]]()
-    live_registers(program.body, {*(lengths if kept is None else kept), *outliving(program)}, after)
+    live_registers(program.body, {*kept, *outliving(program)}, after)
     masked = _Masked(lengths, unused_sign(":", lengths), after)
     masked.run(program.body)
     return replace(program, registers=lengths, body=tuple(masked.statements))

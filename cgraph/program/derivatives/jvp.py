@@ -140,20 +140,17 @@ class Linearized(NamedTuple):
 class Passes(Registers):
     """A program in single assignment, of which derivatives are made.
 
-    of: registers whose values after a pass matter, by default its record.  wrt: those by which derivatives are taken,
+    of: registers whose values after a pass matter.  wrt: those by which derivatives are taken,
     besides what a pass hands on: `inputs`, which stay the same, and `varied`, of the feed.  constant: those whose
     values have no derivatives.  plain: the assignments.  constants: registers that passes read and never write.
     handed: {register that a pass hands on to the next: the one that has its value after the pass}.
     """
 
-    def __init__(
-        self, program: Program, of: Sequence[str] | None, wrt: Sequence[str], constant: Sequence[str] = ()
-    ) -> None:
+    def __init__(self, program: Program, of: Sequence[str], wrt: Sequence[str], constant: Sequence[str] = ()) -> None:
         if not isinstance(program, Program):
             raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
         if controls := [name for name in ("record_if", "stop") if getattr(program, name) is not None]:
             raise GraphError(f"a run has derivatives if it does not depend on numbers how long it is: no {controls[0]}")
-        of = program.record if of is None else of
         for what, names in (("of", of), ("wrt", wrt), ("constant", constant)):
             for name in require_sequence(what, names, "registers", str):
                 length_of(program.registers, what, name)
@@ -239,7 +236,7 @@ def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence
     >>> run.run(run.memory({"x": 3.0, moved.vectors["x"]: 1.0}), passes=2).rows.tolist()
     [[9.0, 6.0], [81.0, 108.0]]
     """
-    passes = Passes(program, None, wrt, constant)
+    passes = Passes(program, getattr(program, "record", ()), wrt, constant)
     tangent, dots = passes.tangents()
     body = [*statements_of(passes.plain), *[statement for each in passes.plain for statement in each.unrun]]
     body += [*tangent.statements, *[copied(after, before) for before, after in passes.handed.items()]]

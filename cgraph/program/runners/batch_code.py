@@ -18,7 +18,7 @@ from ...codegen.llvm_engine import Code
 from ...core.evaluation import Array
 from ...util.memory import aligned, lies_in_rows
 from ..fuse import fused
-from ..many import many
+from ..many import many, many_keeping
 from ..program import Program, whole_graph
 from .llvm_ir import ONE_RUN, offsets, program_ir
 
@@ -86,7 +86,7 @@ def masked_program(program: Program) -> Program:
 
 def lane_program(program: Program, kept: Sequence[str], alike: bool) -> Program:
     """The same, fused, which puts back the registers `kept` where a memory rests."""
-    return fused(many(program, kept), alike=alike)
+    return fused(many_keeping(program, kept), alike=alike)
 
 
 def pass_ir(

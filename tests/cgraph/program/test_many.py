@@ -8,7 +8,7 @@ import pytest
 import cgraph as cg
 from cgraph._shared import Along, Array, Passes, adjoint
 from cgraph.extend import Call, Factor, If, Program, Solve, While, many, program_jvp, runner
-from cgraph.program.program import outliving
+from cgraph.program.many import many_keeping, outliving
 from tests.cgraph.program.test_program_derivatives import LENGTHS, PASSES, START, RandomProgram, seeds
 
 COUNT = 11  # more than one vector, and not a whole number of them
@@ -85,8 +85,8 @@ def test_registers_that_nothing_reads_later_are_not_put_back() -> None:
     program = Program({"a": 1, "b": 1, "test": 1}, [If("test", inside)], record=["a"])
     assert outliving(program) == ["a", "test"]
     assert "b before:1" in many(program).registers
-    assert "b before:1" not in many(program, []).registers
-    assert "b before:1" in many(program, ["b"]).registers
+    assert "b before:1" not in many_keeping(program, []).registers
+    assert "b before:1" in many_keeping(program, ["b"]).registers
 
 
 @pytest.mark.filterwarnings("error")
