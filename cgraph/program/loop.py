@@ -14,7 +14,7 @@ from ..core.node import Node
 from ..core.traversal import topological
 from ..util.require import require_graph, require_mapping, require_sequence
 from .program import Program
-from .runners.choose_runner import runner
+from .runners.native_runner import runner
 from .statements.call import Call
 
 

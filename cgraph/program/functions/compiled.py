@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import pickle
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
@@ -31,8 +32,7 @@ from ..program import Program
 from ..runners.native_runner import NativeRunner
 from ..runners.python_runner import PythonRunner
 from ..statements.call import Call
-from .bound_function import BoundFunction
-from .derivative import Chosen, ColoredMatrix, Derivatives, Ready
+from .derivative import BoundFunction, Chosen, ColoredMatrix, Derivatives, Ready
 
 BACKENDS = ("auto", "python", "numpy", "llvm")
 LARGE_GRAPH = 1_000_000  # nodes; beyond, making machine code takes longer than most callers gain
@@ -139,7 +139,7 @@ class Compiled(BoundFunction):
                 f"an address needs machine code, and this is generated Python, backend {self.backend!r}: "
                 "cg.compile(graph, 'llvm') says what is missing"
             )
-        return c_entry(self._runner.point("x", "y").entry, self.n_in, self.n_out)
+        return c_entry(self._runner.point("x", "y")[1], self.n_in, self.n_out)
 
     def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
@@ -322,10 +322,6 @@ class Compiled(BoundFunction):
         values[...] = 0.0
         return bound(partial(matrix.write, x, values, count) if rows else matrix.bind(x, values))
 
-    def batch_source(self) -> str:
-        """The text of the function for batches: NumPy or LLVM."""
-        return self._runner.text("x", side_by_side=True)
-
     def _points(self, x: ArrayLike) -> Array:
         """The point, (n_in,), or points, (N, n_in), checked."""
         points = real_array("x", x)
@@ -349,40 +345,35 @@ class Compiled(BoundFunction):
         width, found = self.n_in if chosen is None else len(chosen), self.n_out
         if reverse:
             width, found = found, width
-        count, one, total = thread_count(threads), points.ndim == 1, len(points)
-        if not one and rows.ndim == 1:
-            rows = np.broadcast_to(rows, (total, *rows.shape))
-        if rows.ndim - points.ndim not in (0, 1) or rows.shape[-1] != width or not (one or len(rows) == total):
+        count, leading = thread_count(threads), points.shape[:-1]
+        if leading and rows.ndim == 1:
+            rows = np.broadcast_to(rows, (*leading, *rows.shape))
+        if rows.ndim - points.ndim not in (0, 1) or (*rows.shape[: len(leading)], rows.shape[-1]) != (*leading, width):
+            total = len(points)
             each = f"({total}, {width}), ({total}, k, {width}) or ({width},) for {total} points"
-            raise GraphError(
-                f"{name} must have shape {f'(k, {width}) or ({width},)' if one else each}, got {rows.shape}"
-            )
+            wanted = each if leading else f"(k, {width}) or ({width},)"
+            raise GraphError(f"{name} must have shape {wanted}, got {rows.shape}")
         result = np.zeros((*rows.shape[:-1], found))
         if self.n_in and result.size:
             products = self._derivatives.products(chosen, reverse)
-            if not one:
-                products.many(points, rows.reshape(total, -1, width), result.reshape(total, -1, found), count)
-            elif rows.ndim == 2:
-                products.at(points, rows, result)
-            else:
-                products.at(points, rows[None], result[None])
+            along = *leading, -1 if rows.ndim > points.ndim else 1
+            products.write(points, rows.reshape(*along, width), result.reshape(*along, found), count)
         return result
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
-        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
         if not require_flag("sparse", sparse):
-            return matrix.at(points, True, count)
+            return matrix.at(points, True, thread_count(threads))
         module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
-        rows = matrix.at(points, False, count)
-        shape, listed = matrix.entries.shape, rows if rows.ndim == 2 else [rows]
-        found = [module.csr_array((row, columns.copy(), starts.copy()), shape=shape) for row in listed]
+        rows = matrix.at(points, False, thread_count(threads))
+        listed = rows if rows.ndim == 2 else [rows]
+        found = [module.csr_array((row, columns.copy(), starts.copy()), shape=matrix.entries.shape) for row in listed]
         return found if rows.ndim == 2 else found[0]
 
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
         return self._runner.bind_pass(("x", x), ("y", y))[0]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _remade, (_Version(), self.graph, self.backend, self.options)  # which make the machine code again
+        return _unpickled, (__version__, pickle.dumps((self.graph, self.backend, self.options)))
 
     def _repr_html_(self) -> str:
         rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]
@@ -491,19 +482,10 @@ def _place(cache: bool | str | os.PathLike[str]) -> bool | str:
     return str(Path(cache).expanduser().absolute())
 
 
-class _Version:
-    """The version that writes a pickle; in it, the first that is read."""
-
-    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
-        return require_version, (__version__,)
-
-
-def require_version(version: str) -> None:
-    """Raise ValueError unless a pickle was written by this version."""
+def _unpickled(version: str, parts: bytes) -> Compiled:
+    """The function of a pickle, its machine code made again; raises ValueError unless this version wrote it."""
     if version != __version__:
         problem = f"was pickled by cgraph {version}, and this is cgraph {__version__}"
         raise ValueError(f"a compiled graph {problem}: pickle the graph alone, or compile it again")
-
-
-def _remade(_: object, graph: Graph, backend: str, options: dict[str, Any]) -> Compiled:
+    graph, backend, options = pickle.loads(parts)  # noqa: S301 (a part of what pickle reads already)
     return compile(graph, backend, **options)

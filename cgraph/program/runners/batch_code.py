@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -18,7 +18,7 @@ from ...codegen.llvm_engine import Code
 from ...core.evaluation import Array
 from ...util.memory import aligned, lies_in_rows
 from ..fuse import fused
-from ..many import many, many_keeping
+from ..many import many_keeping
 from ..program import Program, whole_graph
 from .llvm_ir import ONE_RUN, offsets, program_ir
 
@@ -41,10 +41,7 @@ class BatchCode:
         self._free: list[Array] = []  # memories
 
     def __call__(self, points: Array, result: Array) -> None:
-        """Results, (n_out, k), of points, (n_in, k), both in rows or both in columns.
-
-        Vectors of points; the last few are filled up to a whole vector by repeating one.
-        """
+        """Results, (n_out, k), of points, (n_in, k), both in rows or both in columns."""
         rows = self._columns is None or lies_in_rows(points)
         axis, order = (1, "F") if rows else (0, "C")
         if points.strides[1 - axis] != points.itemsize or not points.flags.aligned:
@@ -58,9 +55,8 @@ class BatchCode:
         whole = count - count % self._lanes
         if whole:
             self._run(points, result, whole, axis)
-        if whole < count:
-            filled = np.empty((len(points), self._lanes), order=order)  # type: ignore[call-overload]
-            filled[:, : count - whole], filled[:, count - whole :] = points[:, whole:], points[:, -1:]
+        if whole < count:  # the last few, filled up to a whole vector by repeating one
+            filled = np.array(points[:, np.minimum(np.arange(whole, whole + self._lanes), count - 1)], order=order)  # type: ignore[call-overload]
             values = np.empty((len(result), self._lanes), order=order)  # type: ignore[call-overload]
             self._run(filled, values, self._lanes, axis)
             result[:, whole:] = values[:, : count - whole]
@@ -79,30 +75,10 @@ class BatchCode:
         self._free.append(memory)
 
 
-def masked_program(program: Program) -> Program:
-    """The program of memories side by side, see `many`."""
-    return many(program)
-
-
-def lane_program(program: Program, kept: Sequence[str], alike: bool) -> Program:
-    """The same, fused, which puts back the registers `kept` where a memory rests."""
-    return fused(many_keeping(program, kept), alike=alike)
-
-
-def pass_ir(
-    program: Program, masked: Callable[[], Program], name: str, lanes: int, flags: str, registers: int
-) -> Batch:
-    """The text of one pass at many values of a register.  masked: gives the program of memories side by side."""
+def pass_ir(program: Program, name: str, lanes: int, flags: str, registers: int) -> Batch:
+    """The module with `rows`, see `codegen.batch_ir`, of one pass, from the register of that name to its record."""
     if (graph := whole_graph(program, name)) is not None:
         return batch_ir(graph, lanes, flags, registers)
-    return program_rows_ir(masked(), name, lanes, flags, registers)
-
-
-def program_rows_ir(program: Program, name: str, lanes: int, flags: str, registers: int) -> Batch:
-    """The module with `rows`, see `codegen.batch_ir`, of one pass: from the register of that name to what it records.
-
-    Both are read and written where they lie among the registers.
-    """
     places, arithmetic = offsets(program.registers, 1), Arithmetic(flags, lanes, registers)
     point, *results = [Place(places[each], program.registers[each]) for each in (name, *program.record)]
 
@@ -121,12 +97,12 @@ class LaneCode:
     Any number of threads may call it at once, on rows of their own.
     """
 
-    def __init__(self, code: Code, program: Program, kept: Sequence[str], lanes: int, size: int) -> None:
+    def __init__(self, code: Code, program: Program, kept: Sequence[str], size: int) -> None:
         self._entry = code.function("lanes", _LANES)
         places = offsets(program.registers, 1)
         self.numbers = {name: slice(places[name], places[name] + program.registers[name]) for name in kept}
         self.size, self.width = sum([program.registers[name] for name in kept]), program.width
-        self._memory = lanes * size
+        self._memory = size
 
     def __call__(self, memories: Array, which: Counts, passes: Counts, most: int, rows: Array, marks: Array) -> None:
         """Run the memories that `which` names, rows of `memories` (N, size), at most so many passes each.
@@ -141,11 +117,13 @@ class LaneCode:
         self._entry(*[array.ctypes.data for array in arrays], len(which), most, len(marks))
 
 
-def lane_ir(program: Program, kept: int, clock: str, arithmetic: Arithmetic) -> Batch:
-    """The module with `lanes`, see `LaneCode`, of a program under masks whose first `kept` numbers outlive a pass."""
+def lane_ir(program: Program, kept: Sequence[str], clock: str, arithmetic: Arithmetic) -> tuple[Program, Batch]:
+    """The program under masks, and its module with `lanes`, see `LaneCode`; its first registers, `kept`, stay."""
+    program = fused(many_keeping(program, kept), alike=arithmetic.alike)
     source = program_ir(replace(program, record=(), record_if=None, stop=None), arithmetic, 1)
-    lines = _LaneWriter(program, kept, clock, arithmetic).definitions()
-    return Batch("\n".join([source, *lines, ""]), offsets(program.registers, 1)[""])
+    lines = _LaneWriter(program, sum([program.registers[name] for name in kept]), clock, arithmetic).definitions()
+    size = arithmetic.lanes * offsets(program.registers, 1)[""]
+    return program, Batch("\n".join([source, *lines, ""]), size)
 
 
 class _LaneWriter(FunctionWriter):

@@ -7,35 +7,14 @@ from collections.abc import Mapping, Sequence
 
 from ...codegen.arithmetic import REGISTERS, Arithmetic
 from ...codegen.function_writer import copied_bytes
-from ...codegen.llvm_engine import MissingFunctionError
-from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
+from ...codegen.llvm_ir import point_arithmetic, preamble, scalar_ir
 from ..program import Program, whole_graph
-from ..statement import row_of
 from ..statements.call import Call
 from ..writer import Functions, Writer
 
 
-def program_functions(program: Program) -> dict[str, int]:
-    """The functions of the C library that the program's graphs call, {name: number of arguments}."""
-    calls: dict[str, int] = {}
-    for graph in program.graphs():
-        calls |= libm_functions(graph)
-    return dict(sorted(calls.items()))
-
-
-def require_texts(program: Program) -> None:
-    """Raises MissingFunctionError for a program with statements that have no LLVM text."""
-    for statement in program.statements():
-        if row_of(statement).text is None:
-            raise MissingFunctionError(f"statement {type(statement).__name__} has no text for LLVM")
-
-
 def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
-    """Place of each register in the memory, and, under "", the size of it all.
-
-    A register of more than one number is padded to a multiple of `width`, so that whole vectors can be read and
-    written.
-    """
+    """Place of each register in the memory, its length padded to whole vectors; under "" the size of it all."""
     at, places = 0, {}
     for name, length in registers.items():
         places[name] = at
@@ -45,16 +24,13 @@ def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
 
 
 def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:
-    """A module with the function `run`.
+    """A module with `run`, which gives the number of rows of `records` and writes that of passes to `done`.
 
     int64_t run(
         double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed, int64_t stride
     )
 
-    The registers lie in `memory` as `offsets` says, each number a vector of lanes. A row is written to `records`
-    after every `every`th pass; the result is how many; the number of passes that were run goes to `done`. A row of
-    `feed` is read before every pass, `stride` numbers after the last one.
-    width: of the vectors in which `Map` goes through its elements.
+    stride: numbers from a row of the feed to the next.  width: of the vectors in which `Map` goes through its elements.
     """
     functions = Functions(arithmetic, width)
     run = _run_function(program, Writer(program.registers, functions))
@@ -64,12 +40,8 @@ def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:
 def point_ir(
     program: Program, x: str, y: str, flags: str = "", width: int = 1, registers: int = REGISTERS
 ) -> tuple[str, dict[str, int]]:
-    """A module with `void point(double *x, double *y, double *memory)`: one pass, of which two registers lie apart.
-
-    The others lie in `memory`, at the places that come with it, see `offsets`.
-    """
-    graph = whole_graph(program, x)
-    if graph is not None:
+    """A module with `void point(double *x, double *y, double *memory)`, one pass, and the places of registers there."""
+    if (graph := whole_graph(program, x)) is not None:
         return scalar_ir(graph, flags, registers), {"": 0}
     functions = Functions(point_arithmetic(flags, registers), width)
     ir = Writer(program.registers, functions)
@@ -90,7 +62,7 @@ ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i
 
 
 def _run_function(program: Program, ir: Writer) -> list[str]:
-    """The function `run`: the passes, and in each of them the statements, the record and the stop.
+    """The function `run`.
 
     for (done = 0; done < passes;) {
         read; statements; done++; if (--until == 0) { until = every; record } if (stop) break

@@ -1,4 +1,4 @@
-"""A program as machine code, for one memory or a vector of them."""
+"""`runner`: a program as machine code, for one memory or a vector of them, or in Python where there is none."""
 
 from __future__ import annotations
 
@@ -7,22 +7,24 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...codegen import llvm_engine as llvm
 from ...codegen.arithmetic import Arithmetic
 from ...codegen.bound_call import LONG, SHORT, bound_call
-from ...codegen.llvm_ir import point_arithmetic
+from ...codegen.llvm_ir import libm_functions, point_arithmetic
 from ...core.evaluation import Array
 from ...core.scope import without_collection
 from ...util.caches import made_once
+from ...util.explain_failure import explain_failure
 from ...util.memory import aligned
+from ...util.require import require_choice, require_flag
 from ..fuse import fused
 from ..program import Program, outliving, whole_graph
 from ..statement import row_of
-from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts
+from .llvm_ir import offsets, point_ir, program_ir
 from .runner import Record, Runner, Start
 
 if TYPE_CHECKING:
@@ -30,20 +32,13 @@ if TYPE_CHECKING:
     from ...codegen.disk_cache import Cache
     from .batch_code import LaneCode
 
+BACKENDS = ("auto", "python", "llvm")
 _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
 WORK = 2**23  # nodes times points in a block of a batch: some tenths of a millisecond, several times a thread's start
 MANY = 2**14  # operations that take some microseconds: time enough for Python's other threads
 _RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _POINTER, _COUNT)
 _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no NaN and no infinity
-
-
-class PointCode(NamedTuple):
-    """One pass of which two registers lie apart: the text, the function, and where the other registers lie."""
-
-    source: str
-    entry: Any
-    places: dict[str, int]
 
 
 class NativeRunner(Runner):
@@ -58,11 +53,14 @@ class NativeRunner(Runner):
         host = llvm.host()
         super().__init__(program, host.lanes)
         self.lanes = host.lanes
-        require_texts(program)
+        for statement in program.statements():
+            if row_of(statement).text is None:
+                raise llvm.MissingFunctionError(f"statement {type(statement).__name__} has no text for LLVM")
         self._flags, self._host, self._cache = _FAST if fast else "contract" if fma else "", host, cache
         self._fused = fused(program)
         self._nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
-        self._functions = program_functions(self._fused)
+        calls = [call for graph in self._fused.graphs() for call in libm_functions(graph).items()]
+        self._functions = dict(sorted(calls))
         host.require(self._functions)
 
     def _compiled(self, text: str, lanes: int = 1, *, looped: bool = False) -> llvm.Code:
@@ -78,12 +76,11 @@ class NativeRunner(Runner):
     @cached_property
     def masked(self) -> Program:
         """The program of memories side by side, see `many`."""
-        program: Program = self._side.masked_program(self.program)
+        program: Program = self._side.many_keeping(self.program, self.program.registers)
         return program
 
     @cached_property
     def _fused_many(self) -> Program:
-        """The program of a vector of memories."""
         return self._fused if self.masked is self.program else fused(self.masked)
 
     @made_once
@@ -137,28 +134,25 @@ class NativeRunner(Runner):
 
     def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         """The arrays' addresses go into the call."""
-        code = self.point(x[0], y[0])
-        memory = aligned(code.places[""])
+        _, entry, places = self.point(x[0], y[0])
+        memory, lengths = aligned(places[""]), self.program.registers
         memory[:] = 0.0
-        lengths = self.program.registers
-        registers = {name: memory[at : at + lengths[name]] for name, at in code.places.items() if name}
-        return bound_call(code.entry, x[1], y[1], memory), registers
+        registers = {name: memory[at : at + lengths[name]] for name, at in places.items() if name}
+        return bound_call(entry, x[1], y[1], memory), registers
 
     @made_once
-    def point(self, x: str, y: str) -> PointCode:
-        """Machine code of one pass of which two registers lie apart."""
+    def point(self, x: str, y: str) -> tuple[str, Any, dict[str, int]]:
+        """Machine code of one pass of which two registers lie apart: text, function, places of other registers."""
         with without_collection():
             text, places = point_ir(self._fused, x, y, self._flags, self.width, self._host.registers)
-        entry = self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG)
-        return PointCode(text, entry, places)
+        return text, self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG), places
 
     @made_once
     def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
         """The points in a block, and the machine code."""
-        lanes, text, alone = self._host.lanes, self._pass(name), whole_graph(self._fused, name) is not None
-        code, values = self._compiled(text.source, lanes, looped=not alone), start()
-        places = offsets(self._fused_many.registers, 1) if values else {}
-        begin = {places[other]: numbers for other, numbers in values.items()}
+        lanes, text, alone = self.lanes, self._pass(name), whole_graph(self._fused, name) is not None
+        code, places = self._compiled(text.source, lanes, looped=not alone), offsets(self._fused.registers, 1)
+        begin = {places[other]: numbers for other, numbers in start().items()}
         width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
         return width, self._side.BatchCode(code, lanes, text.size, begin, columns=alone)
 
@@ -166,24 +160,50 @@ class NativeRunner(Runner):
         """Registers that outlive a pass, or are results, are in a memory; the others in the code's own."""
         if self.program.feed or any(row_of(each).beside is None for each in self.program.statements()):
             return None
-        lanes, lengths = self._host.lanes, self.program.registers
-        arithmetic = Arithmetic(self._flags, lanes, self._host.registers, alike=alike)
-        first = {*outliving(self._fused), *results}
+        arithmetic = Arithmetic(self._flags, self.lanes, self._host.registers, alike=alike)
+        lengths, first = self.program.registers, {*outliving(self._fused), *results}
         kept = [name for name in lengths if name in first]
         ordered = {name: lengths[name] for name in dict.fromkeys([*kept, *lengths])}
         with without_collection():
-            masked = self._side.lane_program(replace(self._fused, registers=ordered), kept, alike)
-            text = self._side.lane_ir(masked, sum([lengths[name] for name in kept]), clock, arithmetic)
-        code: LaneCode = self._side.LaneCode(self._compiled(text.source, lanes), masked, kept, lanes, text.size)
+            masked, text = self._side.lane_ir(replace(self._fused, registers=ordered), kept, clock, arithmetic)
+        code: LaneCode = self._side.LaneCode(self._compiled(text.source, self.lanes), masked, kept, text.size)
         return code
 
     def text(self, x: str, *, side_by_side: bool = False) -> str:
         """The text in LLVM's language."""
-        return self._pass(x).source if side_by_side else self.point(x, self.program.record[0]).source
+        return self._pass(x).source if side_by_side else self.point(x, self.program.record[0])[0]
 
     def _pass(self, name: str) -> Batch:
         """The module of one pass at many values of a register."""
-        how = self._host.lanes, self._flags, self._host.registers
         with without_collection():
-            text: Batch = self._side.pass_ir(self._fused, lambda: self._fused_many, name, *how)
+            text: Batch = self._side.pass_ir(self._fused, name, self.lanes, self._flags, self._host.registers)
         return text
+
+
+@explain_failure
+def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: bool = True) -> Runner:
+    """A program made ready to run.
+
+    backend: "llvm" is machine code (extra `native`), "python" Python over lists; "auto" takes machine code where
+    llvmlite is installed.  fast, fma: liberties with rounding, as in `cg.compile`.
+    Raises ValueError for an unknown backend, ImportError for "llvm" without llvmlite.
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Program, runner
+    >>> x = cg.variable("x")
+    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
+    >>> run.run(run.memory({"x": 8.0}), passes=3).rows.ravel().tolist()
+    [4.0, 2.0, 1.0]
+    """
+    require_choice("backend", backend, BACKENDS)
+    fast, fma = require_flag("fast", fast), require_flag("fma", fma)
+    if backend != "python":
+        try:
+            return NativeRunner(program, fast=fast, fma=fma)
+        except (ImportError, llvm.MissingFunctionError):
+            if backend == "llvm":
+                raise
+    from .python_runner import PythonRunner
+
+    return PythonRunner(program, fma=fma)

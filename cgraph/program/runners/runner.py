@@ -12,10 +12,9 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
-from ...util.memory import describe, require_memory, require_out
+from ...util.memory import describe, require_memory
 from ...util.require import require_mapping, require_whole
-from ...util.threads import thread_count, write_batch
-from ..program import Program, outliving
+from ..program import Program
 from .llvm_ir import offsets
 
 if TYPE_CHECKING:
@@ -112,8 +111,8 @@ class Runner(ABC):
         """
         many = memory.shape[1:] if isinstance(memory, np.ndarray) and memory.ndim == 2 else ()
         self._check(memory, (self.size, *many), passes, every)
-        if many:
-            self._require_beside()
+        if many and (alone := self.program.alone):
+            raise GraphError(f"programs with {', '.join(alone)} run one memory at a time, not side by side")
         shape = (passes, self.program.feed_width, *many)
         fed = np.empty(shape) if feed is None and not self.program.feed else self._fed(feed, shape)
         try:
@@ -139,61 +138,25 @@ class Runner(ABC):
         self._check(memory, (self.size,), 0, 1)
         return self._bind(memory, rows)
 
-    run_many, advancing = run, bind  # of N memories, and without rows
-
     @abstractmethod
     def text(self, x: str, *, side_by_side: bool = False) -> str:
         """What one pass from this register to the record is run as; with `side_by_side` at many values of it."""
-
-    def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
-        """Record of one pass, (N, width), at each of N values of a register, (N, length), side by side in vectors.
-
-        threads: how many may share the work; None: one for each core.  out: where the rows go, sharing no memory with
-        `values`; a new array by default.
-        Raises GraphError for another shape; if the program cannot `run` N memories, or has a feed; if a pass reads or
-        records a register, other than this one, that it may not have set before.
-        """
-        count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
-        length = len(self.read(np.empty(self.size), name))
-        if rows.ndim != 2 or rows.shape[1] != length:
-            raise GraphError(f"register {name!r} needs values of shape (N, {length}), got {rows.shape}")
-        self._require_beside()
-        if self.program.feed:
-            raise GraphError("a batch takes no feed: give its registers a place in the one that varies")
-        if unset := [each for each in outliving(self.program) if each != name]:
-            raise GraphError(f"a batch needs a pass that sets what it reads: register {unset[0]!r} is read before")
-        shape = len(rows), self.program.width
-        result = np.empty(shape) if out is None else out
-        require_out(result, shape, rows)
-        write_batch(*self.columns(name), rows.T, result.T, count)
-        return result
 
     @abstractmethod
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Machine code of memories in lanes, see `LaneCode`; none in Python, with a feed, or of what runs alone.
 
         clock: a register of length 1.  results: registers that are read after a run.  alike: whether a memory has the
-        bits that it has alone; else sines and such are those of vectors, as of `run` with N memories.
+        bits that it has alone; else sines and such are those of vectors.
         """
 
     @abstractmethod
     def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
-        """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
-
-        The arrays, contiguous and of as many numbers, are not checked; a `Map` that writes y has elements in whole
-        vectors. With it come the other registers, zeros.
-        """
+        """A function of nothing, one pass with registers x and y in unchecked arrays; other registers, zeros."""
 
     @abstractmethod
     def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
-        """The k worth a thread's start, and a writer of records, (width, k), of values of a register, (length, k).
-
-        start: gives initial values of other registers (default 0).
-        """
-
-    def _require_beside(self) -> None:
-        if alone := self.program.alone:
-            raise GraphError(f"programs with {', '.join(alone)} run one memory at a time, not side by side")
+        """The k worth a thread's start, and a writer of records (width, k) of values (length, k) of a register."""
 
     def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
         """The rows of a feed, of that shape; the last dimension may be one for all."""
