@@ -17,11 +17,9 @@ Text = Callable[[FunctionWriter, str], None]  # what writes a function of that n
 
 
 class Functions:
-    """The functions of one module, each written once.
+    """The functions of one module, each written once: `void f(in0, in1, .., out0, out1, ..)`, pointers to registers.
 
-    Every function takes pointers to registers, inputs first: `void f(in0, in1, .., out0, out1, ..)`.
-    definitions: the lines of all functions.  width: of the vectors in which `map` goes through its elements.
-    quick: whether what is defined is to be compiled in little time, for it seldom runs.
+    width: of the vectors in which `map` goes through its elements.  quick: whether to compile in little time.
     """
 
     def __init__(self, arithmetic: Arithmetic, width: int) -> None:
@@ -42,9 +40,7 @@ class Functions:
     ) -> str:
         """y = graph(x), where of its registers some, end to end, are x, and some y; a register may be both.
 
-        products: see `instructions`.  exact: no product is joined with a sum.
-        begins: where the registers lie in the memory, whose address is then the function's one argument: addresses are
-        constants of the instructions. Without, each register has an argument.
+        begins: places of the registers in the memory, the function's one argument: addresses are constants then.
         """
         arithmetic = self.arithmetic.unfused if exact else self.arithmetic
         pointers = ["%in0"] if begins else [f"%in{k}" for k in range(len(registers))]
@@ -55,7 +51,7 @@ class Functions:
         again = {row for row, place in enumerate(y) if place in known}
 
         def text(ir: FunctionWriter, name: str) -> None:
-            self._body(ir, name, graph, x, y, pointers, products=products, last=again)
+            self._body(ir, name, graph, {"x": x, "y": y}, pointers, products=products, last=again)
 
         key = (id(graph), registers, tuple(reads), tuple(writes), exact, begins)
         return self._define(key, "call", text, arithmetic, len(pointers), 0)
@@ -73,7 +69,6 @@ class Functions:
     ) -> str:
         """y[i] = graph(shared, x[i]) for i = 0 .. count - 1, whose number k in a register is at k count + i.
 
-        Where it can, a vector of elements at a time; results beyond the last one go to the register's padding.
         apart: the inputs whose numbers have just been written one by one, and so are read: one load of them all would
         wait until they are in the cache.  asked: the last input says how many elements matter.
         """
@@ -102,13 +97,9 @@ class Functions:
                 x = [place for at, length in zip(common, shared, strict=True) for place in _places(one, at, 0, length)]
                 for k, (at, length) in enumerate(zip(sources, inputs, strict=True)):
                     x += _places(one, at, 0, max(1, length // count), 0 if k in same else count)
-                y = [
-                    place
-                    for at, length in zip(targets, outputs, strict=True)
-                    for place in _places(one, at, 0, length // count, count)
-                ]
+                y = [p for at, n in zip(targets, outputs, strict=True) for p in _places(one, at, 0, n // count, count)]
                 uniform = sum(shared) if in_vectors else 0
-                self._body(ir, name, graph, x, y, [*common, *sources, *targets], uniform=uniform)
+                self._body(ir, name, graph, {"x": x, "y": y}, [*common, *sources, *targets], uniform=uniform)
 
         key = ("map", id(graph), shared, inputs, outputs, count, tuple(gathered), asked)
         return self._define(key, "map", text, arithmetic, first + len(inputs) + asked, len(outputs))
@@ -116,12 +107,11 @@ class Functions:
     @staticmethod
     def _asked(ir: FunctionWriter, register: str, count: int) -> str:
         """The number of elements that a register asks for, from one to `count`."""
-        number, t = ir.load_at(register, "double"), "double"
-        for relation, bound in (("ogt", 1), ("olt", count)):
-            limit = f"{float(bound)!r}"
-            inside = ir.value(f"fcmp {relation} {t} {number}, {limit}")
-            number = ir.value(f"select i1 {inside}, {t} {number}, {t} {limit}")
-        return ir.value(f"fptosi {t} {number} to i64")
+        number = ir.load_at(register, "double")
+        for relation, limit in (("ogt", "1.0"), ("olt", f"{count}.0")):
+            inside = ir.value(f"fcmp {relation} double {number}, {limit}")
+            number = ir.value(f"select i1 {inside}, double {number}, double {limit}")
+        return ir.value(f"fptosi double {number} to i64")
 
     def _gather(self, t: str, size: int) -> str:
         """`x -> the vector of x[0], .., x[size - 1]`, by a load for each, of which LLVM would make one."""
@@ -166,18 +156,9 @@ class Functions:
 
         return self._define(("take", *map(tuple, tables)), "take", text, self.arithmetic, 1, 1)
 
-    def _body(
-        self,
-        ir: FunctionWriter,
-        name: str,
-        graph: Graph,
-        x: Sequence[str],
-        y: Sequence[str],
-        pointers: Sequence[str],
-        **how: Any,
-    ) -> None:
-        """The graph in a function of that name, after what it calls; arguments: see `write_graph`."""
-        for line in write_graph(ir, name, graph, {"x": x, "y": y}, pointers, **how):
+    def _body(self, ir: FunctionWriter, name: str, *graph: Any, **how: Any) -> None:
+        """What computes a graph in a function of that name, see `write_graph`, behind what it calls."""
+        for line in write_graph(ir, name, *graph, **how):
             quick = self.quick and line.startswith("define")
             self.definitions.append(line.replace("noinline {", "noinline optnone {") if quick else line)
 
@@ -204,16 +185,15 @@ class Functions:
 
 
 def _places(t: str, pointer: str, begin: int, count: int, step: int = 1) -> list[str]:
-    """Places of so many numbers of a register."""
+    """Places of numbers of a register."""
     return [f"{t}, ptr {pointer}, i64 {begin + k * step}" for k in range(count)]
 
 
 class Writer(FunctionWriter):
     """The statements of a function over registers, as LLVM's text.
 
-    functions: those of the module, which statements call.  size: of a number in a register, in bytes.
-    pointers: {register: its address}.  before: the statement that has been written last.
-    offsets: {register: its place in %memory}, where they all lie there.  alone: ids of graphs that one statement calls.
+    size: bytes of a number.  before: the statement written last.  offsets: {register: its place in %memory}.
+    alone: ids of graphs that one statement calls.
     """
 
     def __init__(self, registers: Registers, functions: Functions) -> None:
@@ -258,21 +238,11 @@ class Writer(FunctionWriter):
         return self.some(self.compare("ogt", self.load(register), 0.0))
 
     def calls(self, name: str, inputs: Sequence[str], outputs: Sequence[str]) -> None:
-        """Call a function of registers, whose arguments must not overlap.
-
-        A register that it both reads and writes is written to scratch memory, and copied after the call.
-        """
-        targets, copies = [], []
-        for output in outputs:
-            target, length = self.pointers[output], self.registers[output]
-            if output in inputs:
-                beside = self.beside(length)
-                copies.append(copied_bytes(target, beside, length * self.size))
-                target = beside
-            targets.append(target)
-        self.call(name, [*[self.pointers[register] for register in inputs], *targets])
-        for copy in copies:
-            self.line(copy)
+        """Call a function of registers; one that it also reads is written to scratch memory, and copied after."""
+        beside = {output: self.beside(self.registers[output]) for output in outputs if output in inputs}
+        self.call(name, [*map(self.pointer, inputs), *[beside.get(each) or self.pointer(each) for each in outputs]])
+        for output, scratch in beside.items():
+            self.line(copied_bytes(self.pointer(output), scratch, self.registers[output] * self.size))
 
     def call(self, name: str, pointers: Sequence[str], *integers: int) -> None:
         """Call a function of these addresses, and of integers."""

@@ -348,7 +348,8 @@ class Compiled(BoundFunction):
         count, leading = thread_count(threads), points.shape[:-1]
         if leading and rows.ndim == 1:
             rows = np.broadcast_to(rows, (*leading, *rows.shape))
-        if rows.ndim - points.ndim not in (0, 1) or (*rows.shape[: len(leading)], rows.shape[-1]) != (*leading, width):
+        fits = rows.ndim - points.ndim in (0, 1) and rows.shape[-1] == width
+        if not fits or (leading and len(rows) != len(points)):
             total = len(points)
             each = f"({total}, {width}), ({total}, k, {width}) or ({width},) for {total} points"
             wanted = each if leading else f"(k, {width}) or ({width},)"
@@ -356,15 +357,18 @@ class Compiled(BoundFunction):
         result = np.zeros((*rows.shape[:-1], found))
         if self.n_in and result.size:
             products = self._derivatives.products(chosen, reverse)
-            along = *leading, -1 if rows.ndim > points.ndim else 1
-            products.write(points, rows.reshape(*along, width), result.reshape(*along, found), count)
+            if rows.ndim == points.ndim:  # a direction for each point
+                products.write(points, rows[..., None, :], result[..., None, :], count)
+            else:
+                products.write(points, rows, result, count)
         return result
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
+        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
         if not require_flag("sparse", sparse):
-            return matrix.at(points, True, thread_count(threads))
+            return matrix.at(points, True, count)
         module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
-        rows = matrix.at(points, False, thread_count(threads))
+        rows = matrix.at(points, False, count)
         listed = rows if rows.ndim == 2 else [rows]
         found = [module.csr_array((row, columns.copy(), starts.copy()), shape=matrix.entries.shape) for row in listed]
         return found if rows.ndim == 2 else found[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
+from operator import add
 from struct import Struct
 from typing import Any, NamedTuple
 
@@ -110,19 +111,27 @@ class Derivative(NamedTuple):
         return Derivative(self.guarded or self.split)
 
     def products(
-        self, results: str, count: int, k: int = 0, asked: Names = ()
+        self, results: str, count: int, k: int = 0, asked: Names = (), *, checked: bool
     ) -> tuple[list[Statement], dict[str, int]]:
-        """Statements from x, along `count` directions s, to a register of results, and their registers, numbered k."""
-        (primal, linear), s, p = self.split, f"s{k}", f"p{k}"
-        registers = {"x": len(primal.inputs), p: len(primal.outputs)}
+        """Statements from x, along `count` directions s, to a register of results, and their registers, numbered k.
+
+        checked: a register `check` is NaN for a direction of which a result is infinite or NaN, else 0.
+        """
+        (primal, linear), s, p, check = self.split, f"s{k}", f"p{k}", f"check{k}"
+        registers = {"x": len(primal.inputs), p: len(primal.outputs)} | ({check: count} if checked else {})
         registers |= {s: self.split.directions * count, results: len(linear.outputs) * count}
-        return [Call(primal, ("x",), (p,)), Map(linear, (s,), (results,), (p,), asked)], registers
+        statements: list[Statement] = [Call(primal, ("x",), (p,)), Map(linear, (s,), (results,), (p,), asked)]
+        if checked:
+            values = [variable(f"v{k}") for k in range(len(linear.outputs))]
+            terms = [value - value for value in values]
+            while len(terms) > 1:  # in pairs, which do not wait for each other
+                terms = [*map(add, terms[::2], terms[1::2]), *terms[len(terms) & ~1 :]]
+            statements.append(Map(Graph(values, {"nonfinite": terms[0]}), (results,), (check,), (), asked))
+        return statements, registers
 
 
 def _mend(values: Array, write: Callable[[Indices, Array], None]) -> None:
-    """Write values (N, ..) anew, by a split in which zeros win, at points where some are infinite or NaN."""
-    if math.isfinite(np.vdot(values, values)):  # quicker than to look at each
-        return
+    """Write the values of points anew, by a split in which zeros win, where some are infinite or NaN."""
     wrong = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
     if len(wrong):
         found = values[wrong]
@@ -135,13 +144,15 @@ class DirectionProducts:
 
     def __init__(self, derivative: Derivative, ready: Ready, block: int) -> None:
         self._derivative, self._ready, self._block = derivative, ready, block
-        body, registers = derivative.products("y", block, 0, ("asked",))
+        body, registers = derivative.products("y", block, 0, ("asked",), checked=derivative.guarded is not None)
         self._runner = ready(Program({**registers, "asked": 1}, body, ["y"]))
         self._free: list[tuple[Any, ...]] = []  # buffers of a call at a time; pop and append are atomic
 
     def write(self, points: Array, directions: Array, results: Array, threads: int) -> None:
         """The results (k, m) along directions (k, d) at a point (n,), or of points (N, n): (N, k, m), (N, k, d)."""
-        if points.ndim == 1:
+        if points.ndim == 1 and len(directions) <= self._block:
+            self._write_block(points, directions, results)
+        elif points.ndim == 1:
             for start in range(0, len(directions), self._block):  # between blocks, Ctrl-C is heard
                 here = slice(start, start + self._block)
                 self._write_block(points, directions[here], results[here])
@@ -151,13 +162,8 @@ class DirectionProducts:
             rows[:, :, :n], rows[:, :, n:] = points[:, None], directions
             found = results.reshape(-1, results.shape[2])
             write_batch(*self._beside.columns("x"), rows.reshape(-1, rows.shape[2]).T, found.T, threads)
-        if self._derivative.guarded is None:
-            return
-        careful = self._careful
-        if points.ndim == 1:
-            _mend(results[None], lambda at, found: careful.write(points, directions, found[0], threads))
-        else:
-            _mend(results, lambda at, found: careful.write(points[at], directions[at], found, threads))
+            if self._derivative.guarded is not None:
+                _mend(results, lambda at, found: self._careful.write(points[at], directions[at], found, threads))
 
     @cached_property
     def _beside(self) -> Runner:
@@ -178,22 +184,26 @@ class DirectionProducts:
             buffers = self._free.pop()
         except IndexError:
             buffers = self._buffers()
-        x_memory, seeds, asked, y, run = buffers
+        x_memory, seeds, asked, y, check, run = buffers
         count = len(directions)
         x_memory[:] = x
         seeds[:, :count] = directions.T
         asked[0] = count
         run()
         result[...] = y[:, :count].T
+        finite = check is None or check[: 8 * count].tobytes() == bytes(8 * count)  # zeros, but for NaN
         self._free.append(buffers)
+        if not finite:
+            self._careful.write(x, directions, result, 1)
 
     def _buffers(self) -> tuple[Any, ...]:
-        """Memory of the point; directions in columns, and how many; results in columns; the call."""
+        """Memory of the point; directions in columns, and how many; results in columns, and their check; the call."""
         lengths = self._runner.program.registers
         x, y = np.empty(lengths["x"]), aligned(lengths["y"])
         run, registers = self._runner.bind_pass(("x", x), ("y", y))
         seeds, results = (each.reshape(-1, self._block) for each in (registers["s0"], y))
-        return x.data, seeds, registers["asked"].data, results, run
+        check = registers["check0"].data.cast("B") if "check0" in registers else None
+        return x.data, seeds, registers["asked"].data, results, check, run
 
 
 class MatrixPart(NamedTuple):
@@ -227,7 +237,7 @@ class ColoredMatrix:
         self.entries, self._source, self._size = entries, source, size
         self._parts = () if isinstance(source, Graph) else source
         self._lanes, self._ready, self._full = lanes, ready, full(entries)
-        self._guarded = any([part.derivative.guarded is not None for part in self._parts])
+        self._checks = [f"check{k}" for k, part in enumerate(self._parts) if part.derivative.guarded is not None]
         self._functions = [BoundFunction(self.bind, size, shape) for shape in (entries.rows.shape, entries.shape)]
 
     @cached_property
@@ -249,12 +259,15 @@ class ColoredMatrix:
         run, registers = runner.bind_pass(("x", x), ("y", values))
         for name, seeds in self._seeds(self._lanes).items():
             registers[name][:] = seeds
-        if not self._guarded:
+        checks = [(each.data.cast("B"), bytes(each.nbytes)) for name, each in registers.items() if name in self._checks]
+        if not checks:
             return run
 
         def mended() -> None:
             run()
-            _mend(values[None], lambda at, found: self._careful.bind(x, found[0])())
+            for check, zeros in checks:
+                if check.tobytes() != zeros:
+                    self._careful.bind(x, values)()
 
         return mended
 
@@ -267,7 +280,7 @@ class ColoredMatrix:
         width, columns = self._runner(values.ndim == 3 and not self._full, 1).columns("x", self._seeds)
         width //= 1 + sum([part.directions(1) for part in self._parts])
         write_batch(max(width // LEAST_BLOCK, 1) * LEAST_BLOCK, columns, points.T, rows.T, threads)
-        if self._guarded:
+        if self._checks:
             _mend(values, lambda at, found: self._careful.write(points[at], found, threads))
 
     @cached_property
@@ -295,7 +308,8 @@ class ColoredMatrix:
                 statements = [Call(self._source, ("x",), ("e",)), put]
         for k, part in enumerate(self._parts):
             directions = part.directions(lanes)
-            more, lengths = part.derivative.products(f"t{k}", directions, k)
+            checked = f"check{k}" in self._checks and lanes > 1  # side by side the entries are looked at
+            more, lengths = part.derivative.products(f"t{k}", directions, k, checked=checked)
             taken = part.result * directions + part.color
             put = Scatter(f"t{k}", "y", tuple(taken.tolist()), tuple(places[part.entries].tolist()))
             statements += [*more, put]

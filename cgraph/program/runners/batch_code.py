@@ -137,32 +137,31 @@ class _LaneWriter(FunctionWriter):
         self._program, self._kept, self._clock = program, kept, clock
         self._places = offsets(program.registers, 1)
         self._integers = f"<{self.lanes} x i64>"
-        # Of each lane: its memory, or -1; the passes that are left to it; and the next mark of its clock.
+        # Of each lane: its memory, or -1; the passes that are left to it; the next mark of its clock. Memories taken.
         self._holds, self._left, self._due = self.room(1, self._integers), self.room(1, self._integers), self.room()
-        self._given, self._live, self._over = [self.room(1, "i64") for _ in range(3)]  # memories, and the lanes' bits
+        self._taken = self.room(1, "i64")
 
     def definitions(self) -> list[str]:
         """The function, and the one that it moves numbers with."""
         self.store_at("splat (i64 -1)", self._holds, self._integers)
-        self.store_at("zeroinitializer", self._left, self._integers)
+        self.store_at("zeroinitializer", self._left, self._integers)  # all end, with nothing
         self.store_at(self.number(math.inf), self._due)
-        for address, value in ((self._given, 0), (self._live, 0), (self._over, -1)):  # all end, with nothing
-            self.store_at(value, address, "i64")
+        self.store_at(0, self._taken, "i64")
         done = self.room(1, "i64")
         with self.repeat() as end:
-            with self._lanes_of(self.load_at(self._over, "i64")) as lane:
+            ended = self.value(f"icmp sle {self._integers} {self.load_at(self._left, self._integers)}, zeroinitializer")
+            if self._program.stop is not None:  # NaN counts as not 0
+                stopped = self.compare("une", self._register(self._program.stop), 0.0)
+                ended = self.value(f"or {self.bits} {ended}, {stopped}")
+            with self._lanes_of(ended) as lane:
                 self._give_back(lane)
                 self._take(lane)
-            self.leave_unless(self.integer("icmp sgt", self.load_at(self._live, "i64"), 0), end)
+            holds = self.load_at(self._holds, self._integers)
+            self.leave_unless(self.some(self.value(f"icmp sge {self._integers} {holds}, zeroinitializer")), end)
             self.line(ONE_RUN.format(done=done))
             self._record_lanes()
             left = self.value(f"sub {self._integers} {self.load_at(self._left, self._integers)}, splat (i64 1)")
             self.store_at(left, self._left, self._integers)
-            over = self.value(f"icmp sle {self._integers} {left}, zeroinitializer")
-            if self._program.stop is not None:  # NaN counts as not 0
-                stopped = self.compare("une", self._number(self._program.stop), 0.0)
-                over = self.value(f"or {self.bits} {over}, {stopped}")
-            self.store_at(self._mask(over), self._over, "i64")
         moving = FunctionWriter(Arithmetic())
         with moving.loop(0, "%count") as k:
             source, target = (moving.at(f"%{end}", moving.integer("mul", k, f"%{end}.step")) for end in ("from", "to"))
@@ -172,15 +171,18 @@ class _LaneWriter(FunctionWriter):
             *self.function(f"void @lanes({_ALL}) nounwind"),
         ]
 
-    def _number(self, register: str) -> str:
-        return self.load_at(self.at("%w", self._places[register]))
+    def _register(self, name: str) -> str:
+        return self.load_at(self.at("%w", self._places[name]))
 
-    def _mask(self, condition: str) -> str:
-        return self.value(f"zext i{self.lanes} {self.mask(condition)} to i64")
+    def _integer_at(self, base: str, index: str) -> tuple[str, str]:
+        """The address of an integer of an array, and the integer."""
+        address = self.at(base, index, "i64")
+        return address, self.load_at(address, "i64")
 
     @contextmanager
-    def _lanes_of(self, mask: str) -> Iterator[str]:
-        """The lines inside, for every lane whose bit is 1."""
+    def _lanes_of(self, condition: str) -> Iterator[str]:
+        """The lines inside, for every lane where a condition holds."""
+        mask = self.value(f"zext i{self.lanes} {self.mask(condition)} to i64")
         with self.when(self.integer("icmp ne", mask, 0)), self.loop(0, self.lanes) as lane:
             bit = self.value(f"trunc i64 {self.integer('lshr', mask, lane)} to i1")
             with self.when(bit):
@@ -190,16 +192,12 @@ class _LaneWriter(FunctionWriter):
         steps = f"i64 {count}, i64 {to_step}, i64 {from_step}"
         self.line(f"call void @move(ptr {target}, ptr {source}, {steps})")
 
-    def _row(self, base: str, row: str, width: str | int) -> str:
-        """The address of a row of doubles."""
-        return self.at(base, self.integer("mul", row, width), "double")
-
-    def _count_of(self, memory: str, column: int) -> str:
-        """The address of how many passes a memory has run, or marks passed."""
-        return self.at("%passes", self.integer("add", self.integer("mul", memory, 2), column), "i64")
+    def _row(self, base: str, row: str, width: str | int, kind: str = "double") -> str:
+        """The address of a row of numbers."""
+        return self.at(base, self.integer("mul", row, width), kind)
 
     def _set_due(self, lane: str, mark: str) -> str:
-        """The next mark of a lane, infinite behind the last; whether there is one."""
+        """Set the next mark of a lane, infinite behind the last; whether there is one."""
         due, there = self.at(self._due, lane, "double"), self.integer("icmp slt", mark, "%n")
         self.store_at(bits(math.inf), due, "double")
         with self.when(there):
@@ -208,60 +206,52 @@ class _LaneWriter(FunctionWriter):
 
     def _record_lanes(self) -> None:
         """A row in the lanes whose clock has reached a mark, where a row is wanted."""
-        clock, program = self._number(self._clock), self._program
+        clock, program = self._register(self._clock), self._program
         reached = self.compare("oge", clock, self.load_at(self._due))
-        wish = self.compare("ogt", self._number(program.record_if or self._clock), 0.0)
-        with self._lanes_of(self._mask(self.value(f"and {self.bits} {reached}, {wish}"))) as lane:
-            memory = self.load_at(self.at(self._holds, lane, "i64"), "i64")
-            passed, mark = self._count_of(memory, 1), self.room(1, "i64")
-            first = self.load_at(passed, "i64")
-            number = self.integer("add", self.integer("mul", memory, "%n"), first)
-            row, at = self._row("%rows", number, program.width), 0
+        wish = self.compare("ogt", self._register(program.record_if or self._clock), 0.0)
+        with self._lanes_of(self.value(f"and {self.bits} {reached}, {wish}")) as lane:
+            _, memory = self._integer_at(self._holds, lane)
+            passed, first = self._integer_at(self._row("%passes", memory, 2, "i64"), "1")
+            row = self._row("%rows", self.integer("add", self.integer("mul", memory, "%n"), first), program.width)
+            at = 0
             for name in program.record:
                 source = self.at("%w", self.integer("add", lane, self._places[name] * self.lanes), "double")
                 self._move(self.at(row, at, "double"), 1, source, self.lanes, program.registers[name])
                 at += program.registers[name]
             here = self.load_at(self.at(self.at("%w", self._places[self._clock]), lane, "double"), "double")
-            self.store_at(first, mark, "i64")
             with self.repeat() as skipped:  # marks that it has passed at once
-                self.change(mark, "add 1")
-                self.leave_unless(self._set_due(lane, self.load_at(mark, "i64")), skipped)
+                self.change(passed, "add 1")
+                self.leave_unless(self._set_due(lane, self.load_at(passed, "i64")), skipped)
                 due = self.load_at(self.at(self._due, lane, "double"), "double")
                 self.leave_unless(self.value(f"fcmp ole double {due}, {here}"), skipped)
-            self.store_at(self.load_at(mark, "i64"), passed, "i64")
 
     def _give_back(self, lane: str) -> None:
         """The memory of a lane that has ended goes back to its row."""
-        held = self.at(self._holds, lane, "i64")
-        memory = self.load_at(held, "i64")
+        holds, memory = self._integer_at(self._holds, lane)
         with self.when(self.integer("icmp sge", memory, 0)):
-            self._move(
-                self._row("%memories", memory, self._kept), 1, self.at("%w", lane, "double"), self.lanes, self._kept
-            )
-            left = self.load_at(self.at(self._left, lane, "i64"), "i64")
-            self.change(self._count_of(memory, 0), f"add {self.integer('sub', '%most', left)}")
-            self.change(self._live, "sub 1")
-            self.store_at(-1, held, "i64")
+            row = self._row("%memories", memory, self._kept)
+            self._move(row, 1, self.at("%w", lane, "double"), self.lanes, self._kept)
+            made = self.integer("sub", "%most", self._integer_at(self._left, lane)[1])
+            self.change(self._row("%passes", memory, 2, "i64"), f"add {made}")
+            self.store_at(-1, holds, "i64")
 
     def _take(self, lane: str) -> None:
         """The next memory for a lane; where none waits it does what another one does, and records nothing."""
         here, left = self.at("%w", lane, "double"), self.at(self._left, lane, "i64")
-        given = self.load_at(self._given, "i64")
-        with self.when(self.integer("icmp slt", given, "%count")) as otherwise:
-            self.change(self._given, "add 1")
-            self.change(self._live, "add 1")
-            new = self.load_at(self.at("%which", given, "i64"), "i64")
+        number = self.load_at(self._taken, "i64")
+        with self.when(self.integer("icmp slt", number, "%count")) as otherwise:
+            self.change(self._taken, "add 1")
+            _, new = self._integer_at("%which", number)
             self.store_at(new, self.at(self._holds, lane, "i64"), "i64")
             self.store_at("%most", left, "i64")
             self._move(here, self.lanes, self._row("%memories", new, self._kept), 1, self._kept)
-            self._set_due(lane, self.load_at(self._count_of(new, 1), "i64"))
+            self._set_due(lane, self._integer_at(self._row("%passes", new, 2, "i64"), "1")[1])
             otherwise()
             self.store_at(bits(math.inf), self.at(self._due, lane, "double"), "double")
-            with self.loop(0, self.lanes) as other:
-                memory = self.load_at(self.at(self._holds, other, "i64"), "i64")
-                with self.when(self.integer("icmp sge", memory, 0)):
-                    self._move(here, self.lanes, self.at("%w", other, "double"), self.lanes, self._kept)
-                    self.store_at(self.load_at(self.at(self._left, other, "i64"), "i64"), left, "i64")
+            moving = f"icmp sge {self._integers} {self.load_at(self._holds, self._integers)}, zeroinitializer"
+            with self._lanes_of(self.value(moving)) as other:
+                self._move(here, self.lanes, self.at("%w", other, "double"), self.lanes, self._kept)
+                self.store_at(self._integer_at(self._left, other)[1], left, "i64")
 
 
 _ALL = ", ".join([f"ptr noalias %{name}" for name in ("w", "memories", "which", "passes", "rows", "marks")])
