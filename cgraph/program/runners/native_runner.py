@@ -42,10 +42,7 @@ _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no 
 
 
 class NativeRunner(Runner):
-    """A program as machine code. Any number of threads may run it at once, on a memory each.
-
-    fast, fma: liberties of the arithmetic, as in `cg.compile`.
-    """
+    """A program as machine code. Any number of threads may run it at once, on a memory each."""
 
     takes_rows, vectors = True, 17
 
@@ -169,9 +166,9 @@ class NativeRunner(Runner):
         code: LaneCode = self._side.LaneCode(self._compiled(text.source, self.lanes), masked, kept, text.size)
         return code
 
-    def text(self, x: str, *, side_by_side: bool = False) -> str:
+    def text(self, x: str) -> str:
         """The text in LLVM's language."""
-        return self._pass(x).source if side_by_side else self.point(x, self.program.record[0])[0]
+        return self.point(x, self.program.record[0])[0]
 
     def _pass(self, name: str) -> Batch:
         """The module of one pass at many values of a register."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
-from ...util.memory import describe, require_memory
+from ...util.memory import require_memory
 from ...util.require import require_mapping, require_whole
 from ..program import Program
 from .llvm_ir import offsets
@@ -24,19 +23,7 @@ Start = Callable[[], Mapping[str, Array]]  # gives initial values of registers
 
 
 class Record(NamedTuple):
-    """The rows of a run, one for each pass that recorded, and how many passes were run.
-
-    rows: (rows, width), or (rows, width, N) of N runs at once.
-
-    >>> import cgraph as cg
-    >>> from cgraph.extend import Call, Program, runner
-    >>> x = cg.variable("x")
-    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
-    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
-    >>> run.run(run.memory({"x": 8.0}), passes=4, every=2)
-    Record(rows=array([[2. ],
-           [0.5]]), passes=4)
-    """
+    """The rows of a run, (rows, width), or (rows, width, N) of N runs at once, and how many passes were run."""
 
     rows: Array
     passes: int
@@ -110,16 +97,16 @@ class Runner(ABC):
         that run one memory alone.
         """
         many = memory.shape[1:] if isinstance(memory, np.ndarray) and memory.ndim == 2 else ()
-        self._check(memory, (self.size, *many), passes, every)
+        require_memory("a memory", memory, (self.size, *many))
+        require_whole("passes", passes)
+        require_whole("every", every, 1)
         if many and (alone := self.program.alone):
             raise GraphError(f"programs with {', '.join(alone)} run one memory at a time, not side by side")
         shape = (passes, self.program.feed_width, *many)
-        fed = np.empty(shape) if feed is None and not self.program.feed else self._fed(feed, shape)
-        try:
-            return (self._run_many if many else self._run)(memory, passes, every, fed)
-        except MemoryError:
-            rows = f"{passes // every} rows of {self.program.width * math.prod(many)} numbers"
-            raise MemoryError(f"{rows} do not fit in memory: record fewer passes (every)") from None
+        fed = np.empty(() if self.program.feed else shape) if feed is None else real_array("feed", feed)
+        if fed.shape not in (shape, (*shape[:2], 1)[: len(shape)]):
+            raise GraphError(f"the program needs a feed of shape {shape}, got {fed.shape}")
+        return (self._run_many if many else self._run)(memory, passes, every, fed)
 
     def bind(self, memory: Array, rows: Array | None = None) -> Callable[..., None]:
         """A function of nothing: `run` on this memory, len(rows) passes, which writes the rows.
@@ -135,12 +122,12 @@ class Runner(ABC):
         if rows is not None:
             passes = len(rows) if isinstance(rows, np.ndarray) and rows.ndim else 0
             require_memory("rows", rows, (passes, self.program.width))
-        self._check(memory, (self.size,), 0, 1)
+        require_memory("a memory", memory, (self.size,))
         return self._bind(memory, rows)
 
     @abstractmethod
-    def text(self, x: str, *, side_by_side: bool = False) -> str:
-        """What one pass from this register to the record is run as; with `side_by_side` at many values of it."""
+    def text(self, x: str) -> str:
+        """What one pass from this register to the record is run as."""
 
     @abstractmethod
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
@@ -157,20 +144,6 @@ class Runner(ABC):
     @abstractmethod
     def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
         """The k worth a thread's start, and a writer of records (width, k) of values (length, k) of a register."""
-
-    def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
-        """The rows of a feed, of that shape; the last dimension may be one for all."""
-        rows = real_array("feed", () if feed is None else feed)
-        if rows.shape not in (shape, (*shape[:2], 1)[: len(shape)]):
-            raise GraphError(f"the program needs a feed of shape {shape}, got {rows.shape}")
-        return rows
-
-    def _check(self, memory: Array, shape: tuple[int, ...], passes: int, every: int) -> None:
-        fits = isinstance(memory, np.ndarray) and memory.dtype == np.float64 and memory.shape == shape
-        if not fits or not memory.flags.c_contiguous:
-            raise GraphError(f"a memory must be contiguous float64 of shape {shape}, got {describe(memory)}")
-        require_whole("passes", passes)
-        require_whole("every", every, 1)
 
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...

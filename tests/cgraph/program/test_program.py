@@ -278,7 +278,7 @@ def test_wrong_use_of_a_runner(backend: str) -> None:
         run.memory({"b": 1.0})
     with pytest.raises(cg.GraphError, match=r"register 'a' needs shape \(1,\), got \(2,\)"):
         run.memory({"a": [1.0, 2.0]})
-    with pytest.raises(cg.GraphError, match=r"float64 of shape \(1,\), got float64 \(2,\)"):
+    with pytest.raises(cg.GraphError, match=r"float64 in shape \(1,\), got float64 \(2,\)"):
         run.run(np.zeros(2), 1)
     with pytest.raises(ValueError, match="passes must be a whole number from 0, got -1"):
         run.run(np.zeros(1), -1)
