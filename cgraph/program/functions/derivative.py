@@ -214,14 +214,14 @@ class MatrixPart(NamedTuple):
     """
 
     derivative: Derivative
-    colors: Sequence[int]
+    colors: Indices
     color: Indices
     result: Indices
     entries: Indices
 
     def directions(self, lanes: int) -> int:
         """Number of directions, filled up to whole vectors."""
-        return -(-(max(self.colors) + 1) // lanes) * lanes
+        return -(-int(self.colors.max() + 1) // lanes) * lanes
 
 
 class ColoredMatrix:
@@ -259,9 +259,7 @@ class ColoredMatrix:
         run, registers = runner.bind_pass(("x", x), ("y", values))
         for name, seeds in self._seeds(self._lanes).items():
             registers[name][:] = seeds
-        checks = [(each.data.cast("B"), bytes(each.nbytes)) for name, each in registers.items() if name in self._checks]
-        if not checks:
-            return run
+        checks = [(registers[name].data.cast("B"), bytes(registers[name].nbytes)) for name in self._checks]
 
         def mended() -> None:
             run()
@@ -269,16 +267,16 @@ class ColoredMatrix:
                 if check.tobytes() != zeros:
                     self._careful.bind(x, values)()
 
-        return mended
+        return mended if checks else run
 
     def write(self, points: Array, values: Array, threads: int) -> None:
         """The values at points (N, n), which lie side by side in vectors: entries (N, count), or matrices (N, m, n)."""
         if not len(self.entries.rows) or not len(points):
             values[...] = 0.0
             return
-        rows = values.reshape(len(points), -1)
         width, columns = self._runner(values.ndim == 3 and not self._full, 1).columns("x", self._seeds)
         width //= 1 + sum([part.directions(1) for part in self._parts])
+        rows = values.reshape(len(points), -1)
         write_batch(max(width // LEAST_BLOCK, 1) * LEAST_BLOCK, columns, points.T, rows.T, threads)
         if self._checks:
             _mend(values, lambda at, found: self._careful.write(points[at], found, threads))
@@ -290,29 +288,26 @@ class ColoredMatrix:
 
     def _seeds(self, lanes: int = 1) -> dict[str, Array]:
         """The sum of unit vectors of each color, a column each, in the registers of directions."""
-        colors = [(np.array(part.colors)[:, None], np.arange(part.directions(lanes))) for part in self._parts]
-        return {f"s{k}": (each == color).ravel() * 1.0 for k, (each, color) in enumerate(colors)}
+        parts = enumerate(self._parts)
+        return {f"s{k}": 1.0 * (each.colors[:, None] == range(each.directions(lanes))).ravel() for k, each in parts}
 
     @made_once
     def _runner(self, dense: bool, lanes: int) -> Runner:
         """Runner of x -> y, the entries, or with `dense` the whole matrix; directions in vectors of so many lanes."""
-        m, n = self.entries.shape
-        count = len(self.entries.rows)
+        (m, n), count = self.entries.shape, len(self.entries.rows)
         places = self.entries.rows * n + self.entries.columns if dense else np.arange(count)
         registers, statements = {"x": self._size, "y": m * n if dense else count}, list[Statement]()
         if isinstance(self._source, Graph):
-            statements = [Call(self._source, ("x",), ("y",))]
+            statements.append(Call(self._source, ("x",), ("e",) if dense else ("y",)))
             if dense:
                 registers["e"] = count
-                put = Scatter("e", "y", tuple(range(count)), tuple(places.tolist()))
-                statements = [Call(self._source, ("x",), ("e",)), put]
+                statements.append(Scatter("e", "y", tuple(range(count)), tuple(places.tolist())))
         for k, part in enumerate(self._parts):
             directions = part.directions(lanes)
             checked = f"check{k}" in self._checks and lanes > 1  # side by side the entries are looked at
             more, lengths = part.derivative.products(f"t{k}", directions, k, checked=checked)
-            taken = part.result * directions + part.color
-            put = Scatter(f"t{k}", "y", tuple(taken.tolist()), tuple(places[part.entries].tolist()))
-            statements += [*more, put]
+            sources, targets = part.result * directions + part.color, places[part.entries]
+            statements += [*more, Scatter(f"t{k}", "y", tuple(sources.tolist()), tuple(targets.tolist()))]
             registers |= lengths
         return self._ready(Program(registers, statements, ["y"]))
 
@@ -335,45 +330,45 @@ class Derivatives:
     @made_once
     def jacobian(self, chosen: Chosen) -> ColoredMatrix:
         """The Jacobian, from whichever sweeps cost less."""
-        wrt = self._wrt(chosen)
-        entries, source = pattern(self._graph, wrt), list[MatrixPart]()
-        if not len(entries.rows):
-            return self._colored(entries, source, self._size)
-        coloring = jacobian_coloring(entries, LANES)
+        entries = pattern(self._graph, self._wrt(chosen))
+        source = self._jacobian_source(entries, chosen) if len(entries.rows) else ()
+        return ColoredMatrix(entries, source, self._size, self._lanes, self._ready)
+
+    def _jacobian_source(self, entries: Pattern, chosen: Chosen) -> Graph | Sequence[MatrixPart]:
+        wrt, coloring = self._wrt(chosen), jacobian_coloring(entries, LANES)
         once, columns, rows = written_sizes(self._graph, wrt)
         if min(columns, rows) <= once * coloring.vectors(LANES) * self.vector_cost:
-            return self._colored(entries, entry_graph(self._graph, wrt, entries, rows < columns), self._size)
+            return entry_graph(self._graph, wrt, entries, rows < columns)
+        parts = []
         for reverse, colors, mine, keys, others in (  # forward along sums of columns, reverse along sums of rows
             (False, coloring.columns, ~coloring.by_row, entries.columns, entries.rows),
             (True, coloring.rows, coloring.by_row, entries.rows, entries.columns),
         ):
             if len(which := np.flatnonzero(mine)):
-                color, result = np.array(colors)[keys[which]], others[which]
-                source.append(MatrixPart(self._derivative(chosen, reverse), colors, color, result, which))
-        return self._colored(entries, source, self._size)
+                each = np.array(colors)
+                color = each[keys[which]]
+                parts.append(MatrixPart(self._derivative(chosen, reverse), each, color, others[which], which))
+        return parts
 
     @made_once
     def hessian(self, chosen: Chosen) -> ColoredMatrix:
-        """The Hessian of y_bar . y, of points (x, y_bar)."""
-        wrt, size = self._wrt(chosen), self._size + len(self._graph.outputs)
-        if not wrt:  # and no cotangents, which would be the outputs of the reverse mode
-            nothing = np.zeros(0, dtype=np.int64)
-            return self._colored(Pattern(nothing, nothing, (0, 0)), (), size)
-        entries = symmetric(pattern(reverse_products(self._graph, wrt, zero_wins=False), wrt))
-        if not len(entries.rows):
-            return self._colored(entries, (), size)
-        # symmetric, by products with sums of its columns
-        colors = np.array(star_coloring(entries), dtype=np.int64)
-        count = int(colors.max(initial=NONE)) + 1
-        rows, columns = np.maximum(entries.rows, entries.columns), np.minimum(entries.rows, entries.columns)
-        company = np.bincount(entries.rows * count + colors[entries.columns], minlength=len(wrt) * count)  # in a row
-        alone = company[rows * count + colors[columns]] == 1
-        row, color = np.where(alone, rows, columns), np.where(alone, colors[columns], colors[rows])
-        derivative = _derivative_of(partial(_second_products, self._graph, wrt), len(wrt))
-        return self._colored(entries, [MatrixPart(derivative, colors.tolist(), color, row, np.arange(len(row)))], size)
-
-    def _colored(self, entries: Pattern, source: Graph | Sequence[MatrixPart], size: int) -> ColoredMatrix:
-        return ColoredMatrix(entries, source, size, self._lanes, self._ready)
+        """The Hessian of y_bar . y, of points (x, y_bar), symmetric, by products with sums of its columns."""
+        wrt, nothing = self._wrt(chosen), np.zeros(0, dtype=np.int64)
+        entries, parts = Pattern(nothing, nothing, (0, 0)), list[MatrixPart]()
+        if wrt:  # without, cotangents would be the outputs of the reverse mode
+            entries = symmetric(pattern(reverse_products(self._graph, wrt, zero_wins=False), wrt))
+        if len(entries.rows):
+            colors = np.array(star_coloring(entries), dtype=np.int64)
+            count = int(colors.max(initial=NONE)) + 1
+            rows, columns = np.maximum(entries.rows, entries.columns), np.minimum(entries.rows, entries.columns)
+            company = np.bincount(
+                entries.rows * count + colors[entries.columns], minlength=len(wrt) * count
+            )  # in a row
+            alone = company[rows * count + colors[columns]] == 1
+            row, color = np.where(alone, rows, columns), np.where(alone, colors[columns], colors[rows])
+            derivative = _derivative_of(partial(_second_products, self._graph, wrt), len(wrt))
+            parts.append(MatrixPart(derivative, colors, color, row, np.arange(len(row))))
+        return ColoredMatrix(entries, parts, self._size + len(self._graph.outputs), self._lanes, self._ready)
 
     @made_once
     def _derivative(self, chosen: Chosen, reverse: bool) -> Derivative:
