@@ -97,7 +97,12 @@ class _Registers:
             given = [value for name in statement.inputs for value in self._values(name)]
             values = self._applied(statement.graph, given, products_in(statement))
         else:
-            rows, outputs = self._rows(statement), len(statement.graph.outputs)
+            count, products = elements(statement, self._lengths), products_of(statement.graph)
+            shared = [value for name in statement.shared for value in self._values(name)]
+            each = [self._values(name) for name in statement.inputs]
+            points = [[*shared, *[values[i if len(values) == count else 0] for values in each]] for i in range(count)]
+            rows = [self._applied(statement.graph, point, products) for point in points]
+            outputs = len(statement.graph.outputs)
             if isinstance(statement, Map):
                 values = [row[k] for k in range(outputs) for row in rows]
             else:
@@ -115,14 +120,6 @@ class _Registers:
         graph = Graph(inputs, {f"{k}": value for k, value in enumerate(outputs)})
         products = None if self._products == products_of(graph) else self._products
         return Call(graph, tuple(self._read), tuple(self._written), products)
-
-    def _rows(self, statement: Map | Sum) -> list[list[Node]]:
-        """The outputs for every element."""
-        count, products = elements(statement, self._lengths), products_of(statement.graph)
-        shared = [value for name in statement.shared for value in self._values(name)]
-        columns = [self._values(name) for name in statement.inputs]
-        points = [[*shared, *[column[i if len(column) == count else 0] for column in columns]] for i in range(count)]
-        return [self._applied(statement.graph, point, products) for point in points]
 
     def _values(self, name: str) -> list[Node]:
         if name in self._written:

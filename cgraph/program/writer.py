@@ -79,6 +79,14 @@ class Functions:
         same = [k for k, length in enumerate(inputs) if length == 1 != count]
         gathered = [k for k, each in enumerate(apart) if each and in_vectors and inputs[k] == count]
         first, one, vector = len(shared), self.arithmetic.type, arithmetic.type
+        size = min(count, self.width)
+
+        def gather(_: Arithmetic) -> list[str]:  # a vector by a load for each number, of which LLVM would make one
+            ir, found = FunctionWriter(self.arithmetic), "poison"
+            for lane in range(size):
+                number = ir.value(f"load volatile double, ptr {ir.at('%x', lane)}, align 8")
+                found = ir.value(f"insertelement {vector} {found}, double {number}, i32 {lane}")
+            return ir.function(f"internal {vector} @gathered{size}(ptr %x) nounwind noinline", f"{vector} {found}")
 
         def text(ir: FunctionWriter, name: str) -> None:
             common, found = [f"%in{k}" for k in range(first)], [f"%in{first + k}" for k in range(len(inputs))]
@@ -86,12 +94,17 @@ class Functions:
                 number = ir.spread(ir.load_at(found[k], "double"))
                 found[k] = ir.room()
                 ir.store_at(number, found[k])
-            gather = self._gather(vector, min(count, self.width)) if gathered else ""
-            brought = {k: ir.room() for k in gathered}
-            end = self._asked(ir, f"%in{first + len(inputs)}", count) if asked and self.arithmetic.lanes == 1 else count
+            brought = {k: ir.room() for k in gathered if self.text(f"gathered{size}", gather)}
+            end: str | int = count
+            if asked and self.arithmetic.lanes == 1:  # from one to count
+                number = ir.load_at(f"%in{first + len(inputs)}", "double")
+                for relation, limit in (("ogt", "1.0"), ("olt", f"{count}.0")):
+                    inside = ir.value(f"fcmp {relation} double {number}, {limit}")
+                    number = ir.value(f"select i1 {inside}, double {number}, double {limit}")
+                end = ir.value(f"fptosi double {number} to i64")
             with ir.loop(0, end, arithmetic.lanes if in_vectors else 1) as i:
                 for k in gathered:
-                    ir.store_at(ir.value(f"call {vector} @{gather}(ptr {ir.at(found[k], i, one)})"), brought[k])
+                    ir.store_at(ir.value(f"call {vector} @gathered{size}(ptr {ir.at(found[k], i, one)})"), brought[k])
                 sources = [brought.get(k, at if k in same else ir.at(at, i, one)) for k, at in enumerate(found)]
                 targets = [ir.at(f"%out{k}", i, one) for k in range(len(outputs))]
                 x = [place for at, length in zip(common, shared, strict=True) for place in _places(one, at, 0, length)]
@@ -104,41 +117,14 @@ class Functions:
         key = ("map", id(graph), shared, inputs, outputs, count, tuple(gathered), asked)
         return self._define(key, "map", text, arithmetic, first + len(inputs) + asked, len(outputs))
 
-    @staticmethod
-    def _asked(ir: FunctionWriter, register: str, count: int) -> str:
-        """The number of elements that a register asks for, from one to `count`."""
-        number = ir.load_at(register, "double")
-        for relation, limit in (("ogt", "1.0"), ("olt", f"{count}.0")):
-            inside = ir.value(f"fcmp {relation} double {number}, {limit}")
-            number = ir.value(f"select i1 {inside}, double {number}, double {limit}")
-        return ir.value(f"fptosi double {number} to i64")
-
-    def _gather(self, t: str, size: int) -> str:
-        """`x -> the vector of x[0], .., x[size - 1]`, by a load for each, of which LLVM would make one."""
-        name = f"gathered{size}"
-
-        def text(arithmetic: Arithmetic) -> list[str]:
-            ir, vector = FunctionWriter(arithmetic), "poison"
-            for lane in range(size):
-                number = ir.value(f"load volatile double, ptr {ir.at('%x', lane)}, align 8")
-                vector = ir.value(f"insertelement {t} {vector}, double {number}, i32 {lane}")
-            return ir.function(f"internal {t} @{name}(ptr %x) nounwind noinline", f"{t} {vector}")
-
-        return self.text(name, text)
-
     def total(self, count: int) -> str:
         """y = x[0] + .. + x[count - 1], added up in this order from 0."""
-        t = self.arithmetic.type
 
         def text(ir: FunctionWriter, _: str) -> None:
-            if not count:
-                ir.store_at(ir.number(0.0), "%out0")
-                return
+            ir.store_at(ir.number(0.0), "%out0")
             with ir.loop(0, count) as i:
-                before = f"[ {ir.number(0.0)}, %start ], [ {i}.total, %{i[1:]}.again ]"
-                ir.line(f"{i}.sum = phi {t} {before}")
-                ir.line(f"{i}.total = fadd {t} {i}.sum, {ir.load_at(ir.at('%in0', i))}")
-            ir.store_at(f"{i}.total", "%out0")
+                term = ir.load_at(ir.at("%in0", i))
+                ir.store_at(ir.value(f"fadd {ir.type} {ir.load_at('%out0')}, {term}"), "%out0")
 
         return self._define(("total", count), "total", text, self.arithmetic, 1, 1)
 

@@ -183,27 +183,23 @@ class DirectionProducts:
         try:
             buffers = self._free.pop()
         except IndexError:
-            buffers = self._buffers()
-        x_memory, seeds, asked, y, check, run = buffers
+            lengths = self._runner.program.registers
+            point, y = np.empty(lengths["x"]), aligned(lengths["y"])
+            run, registers = self._runner.bind_pass(("x", point), ("y", y))
+            columns = [each.reshape(-1, self._block) for each in (registers["s0"], y)]
+            check = registers["check0"].data.cast("B") if "check0" in registers else None
+            buffers = point.data, *columns, registers["asked"].data, check, run
+        x_memory, seeds, results, asked, check, run = buffers
         count = len(directions)
         x_memory[:] = x
         seeds[:, :count] = directions.T
         asked[0] = count
         run()
-        result[...] = y[:, :count].T
+        result[...] = results[:, :count].T
         finite = check is None or check[: 8 * count].tobytes() == bytes(8 * count)  # zeros, but for NaN
         self._free.append(buffers)
         if not finite:
             self._careful.write(x, directions, result, 1)
-
-    def _buffers(self) -> tuple[Any, ...]:
-        """Memory of the point; directions in columns, and how many; results in columns, and their check; the call."""
-        lengths = self._runner.program.registers
-        x, y = np.empty(lengths["x"]), aligned(lengths["y"])
-        run, registers = self._runner.bind_pass(("x", x), ("y", y))
-        seeds, results = (each.reshape(-1, self._block) for each in (registers["s0"], y))
-        check = registers["check0"].data.cast("B") if "check0" in registers else None
-        return x.data, seeds, registers["asked"].data, results, check, run
 
 
 class MatrixPart(NamedTuple):
@@ -366,7 +362,12 @@ class Derivatives:
             )  # in a row
             alone = company[rows * count + colors[columns]] == 1
             row, color = np.where(alone, rows, columns), np.where(alone, colors[columns], colors[rows])
-            derivative = _derivative_of(partial(_second_products, self._graph, wrt), len(wrt))
+
+            def second(*, zero_wins: bool) -> Graph:
+                reverse = reverse_products(self._graph, wrt, zero_wins=zero_wins)
+                return forward_products(reverse, wrt, zero_wins=zero_wins)
+
+            derivative = _derivative_of(second, len(wrt))
             parts.append(MatrixPart(derivative, colors, color, row, np.arange(len(row))))
         return ColoredMatrix(entries, parts, self._size + len(self._graph.outputs), self._lanes, self._ready)
 
@@ -391,8 +392,3 @@ def _derivative_of(derive: Callable[..., Graph], directions: int) -> Derivative:
     guarded = direction_split(derive(zero_wins=True), directions)
     saved = len(guarded.linear.nodes) - len(plain.linear.nodes)
     return Derivative(plain, guarded) if saved > CHECK else Derivative(guarded)
-
-
-def _second_products(graph: Graph, wrt: Sequence[Node], *, zero_wins: bool) -> Graph:
-    """x, y_bar, x_dot -> the Hessian of y_bar . y times x_dot."""
-    return forward_products(reverse_products(graph, wrt, zero_wins=zero_wins), wrt, zero_wins=zero_wins)

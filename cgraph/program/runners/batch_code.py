@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -20,8 +20,10 @@ from ...util.memory import aligned, lies_in_rows
 from ..fuse import fused
 from ..many import many_keeping
 from ..program import Program, whole_graph
-from .llvm_ir import ONE_RUN, offsets, program_ir
+from .runner import offsets
 
+ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0)"  # a pass without a record
+Source = Callable[[Program, Arithmetic], str]  # writes the module with `run`
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 _LANES = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 6, *[ctypes.c_int64] * 3)
 _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
@@ -30,14 +32,13 @@ _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int
 class BatchCode:
     """The function of batches of a module; any number of threads may call it at once.
 
-    size: of the memory that a call needs, which holds zeros at first and, from numbers of vectors on, those of `start`.
-    columns: whether it takes points in columns, too, and not rows alone.
+    start: {a vector of the memory: numbers from there on}, else 0.  columns: whether points may be in columns, too.
     """
 
-    def __init__(self, code: Code, lanes: int, size: int, start: Mapping[int, Array], *, columns: bool = True) -> None:
+    def __init__(self, code: Code, lanes: int, text: Batch, start: Mapping[int, Array], *, columns: bool) -> None:
         self._rows = code.function("rows", _BATCH)
         self._columns = code.function("batch", _BATCH) if columns else None
-        self._lanes, self._size, self._start = lanes, size, start
+        self.source, self._size, self._lanes, self._start = text.source, text.size, lanes, start
         self._free: list[Array] = []  # memories
 
     def __call__(self, points: Array, result: Array) -> None:
@@ -75,19 +76,19 @@ class BatchCode:
         self._free.append(memory)
 
 
-def pass_ir(program: Program, name: str, lanes: int, flags: str, registers: int) -> Batch:
+def pass_ir(program: Program, name: str, arithmetic: Arithmetic, source: Source) -> Batch:
     """The module with `rows`, see `codegen.batch_ir`, of one pass, from the register of that name to its record."""
     if (graph := whole_graph(program, name)) is not None:
-        return batch_ir(graph, lanes, flags, registers)
-    places, arithmetic = offsets(program.registers, 1), Arithmetic(flags, lanes, registers)
+        return batch_ir(graph, arithmetic.lanes, arithmetic.flags, arithmetic.registers)
+    places = offsets(program.registers, 1)
     point, *results = [Place(places[each], program.registers[each]) for each in (name, *program.record)]
 
     def compute(ir: FunctionWriter, *_: str) -> None:
         ir.line(ONE_RUN.format(done=ir.room(1, "i64")))
 
-    source = program_ir(replace(program, record=()), arithmetic, 1)
-    driver = rows_ir(Arithmetic(flags, lanes), point, results, compute)
-    return Batch("\n".join([source, *driver, ""]), lanes * places[""])
+    driver = rows_ir(Arithmetic(arithmetic.flags, arithmetic.lanes), point, results, compute)
+    text = source(replace(program, record=()), arithmetic)
+    return Batch("\n".join([text, *driver, ""]), arithmetic.lanes * places[""])
 
 
 class LaneCode:
@@ -117,13 +118,14 @@ class LaneCode:
         self._entry(*[array.ctypes.data for array in arrays], len(which), most, len(marks))
 
 
-def lane_ir(program: Program, kept: Sequence[str], clock: str, arithmetic: Arithmetic) -> tuple[Program, Batch]:
+def lane_ir(
+    program: Program, kept: Sequence[str], clock: str, arithmetic: Arithmetic, source: Source
+) -> tuple[Program, Batch]:
     """The program under masks, and its module with `lanes`, see `LaneCode`; its first registers, `kept`, stay."""
     program = fused(many_keeping(program, kept), alike=arithmetic.alike)
-    source = program_ir(replace(program, record=(), record_if=None, stop=None), arithmetic, 1)
+    text = source(replace(program, record=(), record_if=None, stop=None), arithmetic)
     lines = _LaneWriter(program, sum([program.registers[name] for name in kept]), clock, arithmetic).definitions()
-    size = arithmetic.lanes * offsets(program.registers, 1)[""]
-    return program, Batch("\n".join([source, *lines, ""]), size)
+    return program, Batch("\n".join([text, *lines, ""]), arithmetic.lanes * offsets(program.registers, 1)[""])
 
 
 class _LaneWriter(FunctionWriter):

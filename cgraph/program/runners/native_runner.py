@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -14,7 +15,8 @@ import numpy as np
 from ...codegen import llvm_engine as llvm
 from ...codegen.arithmetic import Arithmetic
 from ...codegen.bound_call import LONG, SHORT, bound_call
-from ...codegen.llvm_ir import libm_functions, point_arithmetic
+from ...codegen.function_writer import copied_bytes
+from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
 from ...core.evaluation import Array
 from ...core.scope import without_collection
 from ...util.caches import made_once
@@ -24,13 +26,14 @@ from ...util.require import require_choice, require_flag
 from ..fuse import fused
 from ..program import Program, outliving, whole_graph
 from ..statement import row_of
-from .llvm_ir import offsets, point_ir, program_ir
-from .runner import Record, Runner, Start
+from ..statements.call import Call
+from ..writer import Functions, Writer
+from .runner import Record, Runner, Start, offsets
 
 if TYPE_CHECKING:
     from ...codegen.batch_ir import Batch
     from ...codegen.disk_cache import Cache
-    from .batch_code import LaneCode
+    from .batch_code import BatchCode, LaneCode
 
 BACKENDS = ("auto", "python", "llvm")
 _NUMBER = 8  # bytes
@@ -145,13 +148,15 @@ class NativeRunner(Runner):
         return text, self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG), places
 
     @made_once
-    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
+    def columns(self, name: str, start: Start = dict) -> tuple[int, BatchCode]:
         """The points in a block, and the machine code."""
-        lanes, text, alone = self.lanes, self._pass(name), whole_graph(self._fused, name) is not None
-        code, places = self._compiled(text.source, lanes, looped=not alone), offsets(self._fused.registers, 1)
+        arithmetic, alone = Arithmetic(self._flags, self.lanes, self._host.registers), whole_graph(self._fused, name)
+        with without_collection():
+            text: Batch = self._side.pass_ir(self._fused, name, arithmetic, program_ir)
+        code, places = self._compiled(text.source, self.lanes, looped=alone is None), offsets(self._fused.registers, 1)
         begin = {places[other]: numbers for other, numbers in start().items()}
-        width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
-        return width, self._side.BatchCode(code, lanes, text.size, begin, columns=alone)
+        width = max(WORK // max(1, self._nodes) // self.lanes, 1) * self.lanes
+        return width, self._side.BatchCode(code, self.lanes, text, begin, columns=alone is not None)
 
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Registers that outlive a pass, or are results, are in a memory; the others in the code's own."""
@@ -160,9 +165,9 @@ class NativeRunner(Runner):
         arithmetic = Arithmetic(self._flags, self.lanes, self._host.registers, alike=alike)
         lengths, first = self.program.registers, {*outliving(self._fused), *results}
         kept = [name for name in lengths if name in first]
-        ordered = {name: lengths[name] for name in dict.fromkeys([*kept, *lengths])}
+        program = replace(self._fused, registers={name: lengths[name] for name in dict.fromkeys([*kept, *lengths])})
         with without_collection():
-            masked, text = self._side.lane_ir(replace(self._fused, registers=ordered), kept, clock, arithmetic)
+            masked, text = self._side.lane_ir(program, kept, clock, arithmetic, program_ir)
         code: LaneCode = self._side.LaneCode(self._compiled(text.source, self.lanes), masked, kept, text.size)
         return code
 
@@ -170,11 +175,68 @@ class NativeRunner(Runner):
         """The text in LLVM's language."""
         return self.point(x, self.program.record[0])[0]
 
-    def _pass(self, name: str) -> Batch:
-        """The module of one pass at many values of a register."""
-        with without_collection():
-            text: Batch = self._side.pass_ir(self._fused, name, self.lanes, self._flags, self._host.registers)
-        return text
+
+def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:
+    """A module with `run`, which gives the number of rows of `records` and writes that of passes to `done`.
+
+    int64_t run(
+        double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed, int64_t stride
+    )
+
+    stride: numbers from a row of the feed to the next.  width: of the vectors in which `Map` goes through its elements.
+    """
+    functions = Functions(arithmetic, width)
+    ir, places = Writer(program.registers, functions), offsets(program.registers, width)
+    ir.offsets = places
+    ir.pointers = {name: ir.at("%memory", places[name]) for name in program.registers}
+    calls = Counter([id(each.graph) for each in program.statements() if isinstance(each, Call)])
+    ir.alone = frozenset([graph for graph, count in calls.items() if count == 1])
+    row = ir.room(1, "ptr")
+    ir.store_at("%records", row, "ptr")
+    ir.store_at(0, "%done", "i64")
+    with ir.repeat() as end:
+        before = ir.load_at("%done", "i64")
+        ir.leave_unless(ir.integer("icmp slt", before, "%passes"), end)
+        _moved(ir, program.feed, ir.at("%feed", ir.integer("mul", before, "%stride")), reading=True)
+        ir.run(program.body)
+        done = ir.integer("add", before, 1)
+        ir.store_at(done, "%done", "i64")
+        due = ir.integer("icmp eq", ir.integer("urem", done, "%every"), 0)
+        with ir.when(due), ir.when("true" if program.record_if is None else ir.positive(program.record_if)):
+            ir.store_at(_moved(ir, program.record, ir.load_at(row, "ptr"), reading=False), row, "ptr")
+        if program.stop is not None:  # NaN counts as not 0
+            ir.leave_unless(ir.compare("oeq", ir.load(program.stop), 0.0), end)
+    first, last = [ir.value(f"ptrtoint ptr {each} to i64") for each in ("%records", ir.load_at(row, "ptr"))]
+    rows = ir.integer("sdiv", ir.integer("sub", last, first), max(1, program.width) * ir.size)
+    counts = "i64 %passes, i64 %every, ptr %done, ptr noalias %feed, i64 %stride"
+    run = ir.function(f"i64 @run(ptr noalias %memory, ptr noalias %records, {counts}) nounwind", f"i64 {rows}")
+    return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
+
+
+def point_ir(program: Program, x: str, y: str, flags: str, width: int, registers: int) -> tuple[str, dict[str, int]]:
+    """A module with `void point(double *x, double *y, double *memory)`, one pass, and the places of registers there."""
+    if (graph := whole_graph(program, x)) is not None:
+        return scalar_ir(graph, flags, registers), {"": 0}
+    functions = Functions(point_arithmetic(flags, registers), width)
+    ir = Writer(program.registers, functions)
+    # Single numbers last: others then begin where vectors may.
+    lengths = sorted(program.registers.items(), key=lambda item: item[1] < 2)
+    inner = {name: length for name, length in lengths if name not in (x, y)}
+    places = offsets(inner, width)
+    ir.pointers = {x: "%x", y: "%y", **{name: ir.at("%memory", places[name]) for name in inner}}
+    ir.run(program.body)
+    point = ir.function("void @point(ptr noalias %x, ptr noalias %y, ptr noalias %memory) nounwind")
+    return "\n".join([*preamble(program.graphs(), functions.arithmetic), *functions.definitions, *point, ""]), places
+
+
+def _moved(ir: Writer, names: Sequence[str], row: str, *, reading: bool) -> str:
+    """Registers from a row, where they lie end to end, or to it; the address behind it."""
+    for name in names:
+        length, register = ir.registers[name], ir.pointer(name)
+        target, source = (register, row) if reading else (row, register)
+        ir.line(copied_bytes(target, source, length * ir.size))
+        row = ir.at(row, length)
+    return row
 
 
 @explain_failure
