@@ -474,7 +474,7 @@ LEFT_OUT = """cg.as_jax cg.to_casadi cg.to_jax cg.to_torch cg.recording_lines cg
     dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along dyn.JointFriction.check
     dyn.Actuator.along dyn.Actuator.check extend.Builder extend.Runner extend.require_length
     extend.Runner.read extend.Runner.write extend.effects extend.Runner.lane_code extend.Formulas.lines
-    extend.Runner.text extend.Runner.bind_pass extend.Runner.columns extend.Program.listing
+    extend.Runner.text extend.Program.listing
     extend.Names.called extend.Names.formula extend.Names.inputs_of extend.Names.line extend.Names.meant
     extend.Names.short extend.Names.shown extend.Names.text"""
 

@@ -27,12 +27,14 @@ from ...util.threads import write_batch
 from ...util.words import listed
 from ..fuse import applied
 from ..program import Program
-from ..runners.runner import Runner
+from ..runners.native_runner import NativeRunner
+from ..runners.python_runner import PythonRunner
 from ..statement import Names, Statement
 from ..statements.call import Call, Map
 from ..statements.memory import Scatter
 
-Ready = Callable[[Program], Runner]  # makes a program ready to run
+AnyRunner = NativeRunner | PythonRunner
+Ready = Callable[[Program], AnyRunner]  # makes a program ready to run
 Chosen = tuple[int, ...] | None  # the numbers of inputs; None for all
 CHECK = 256  # operations that take as long as to look whether slopes are infinite
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
@@ -105,11 +107,6 @@ class Derivative(NamedTuple):
     split: DirectionSplit
     guarded: DirectionSplit | None = None
 
-    @property
-    def careful(self) -> Derivative:
-        """The one whose results are right wherever slopes are infinite."""
-        return Derivative(self.guarded or self.split)
-
     def products(
         self, results: str, count: int, k: int = 0, asked: Names = (), *, checked: bool
     ) -> tuple[list[Statement], dict[str, int]]:
@@ -166,7 +163,7 @@ class DirectionProducts:
                 _mend(results, lambda at, found: self._careful.write(points[at], directions[at], found, threads))
 
     @cached_property
-    def _beside(self) -> Runner:
+    def _beside(self) -> AnyRunner:
         """Runner of a point and one direction, as one register, for many of these side by side."""
         primal, linear = self._derivative.split
         seeds = linear.inputs[len(primal.outputs) :]
@@ -177,7 +174,9 @@ class DirectionProducts:
 
     @cached_property
     def _careful(self) -> DirectionProducts:
-        return DirectionProducts(self._derivative.careful, self._ready, self._block)
+        return DirectionProducts(
+            Derivative(self._derivative.guarded or self._derivative.split), self._ready, self._block
+        )
 
     def _write_block(self, x: Array, directions: Array, result: Array) -> None:
         try:
@@ -279,7 +278,8 @@ class ColoredMatrix:
 
     @cached_property
     def _careful(self) -> ColoredMatrix:
-        parts = [part._replace(derivative=part.derivative.careful) for part in self._parts]
+        careful = [Derivative(part.derivative.guarded or part.derivative.split) for part in self._parts]
+        parts = [part._replace(derivative=each) for part, each in zip(self._parts, careful, strict=True)]
         return ColoredMatrix(self.entries, parts, self._size, self._lanes, self._ready)
 
     def _seeds(self, lanes: int = 1) -> dict[str, Array]:
@@ -288,7 +288,7 @@ class ColoredMatrix:
         return {f"s{k}": 1.0 * (each.colors[:, None] == range(each.directions(lanes))).ravel() for k, each in parts}
 
     @made_once
-    def _runner(self, dense: bool, lanes: int) -> Runner:
+    def _runner(self, dense: bool, lanes: int) -> AnyRunner:
         """Runner of x -> y, the entries, or with `dense` the whole matrix; directions in vectors of so many lanes."""
         (m, n), count = self.entries.shape, len(self.entries.rows)
         places = self.entries.rows * n + self.entries.columns if dense else np.arange(count)
@@ -314,7 +314,7 @@ class Derivatives:
     runner: what runs the graph itself.  ready: makes a program ready to run in the same way.
     """
 
-    def __init__(self, graph: Graph, ready: Ready, runner: Runner) -> None:
+    def __init__(self, graph: Graph, ready: Ready, runner: AnyRunner) -> None:
         self._original, self._ready, self._size = graph, ready, len(graph.inputs)
         self._lanes, self._block, self.vector_cost = runner.lanes, runner.lanes * runner.vectors, runner.vector_cost
 

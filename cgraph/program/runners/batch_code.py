@@ -164,14 +164,14 @@ class _LaneWriter(FunctionWriter):
             self._record_lanes()
             left = self.value(f"sub {self._integers} {self.load_at(self._left, self._integers)}, splat (i64 1)")
             self.store_at(left, self._left, self._integers)
+        arrays = [f"ptr noalias %{name}" for name in ("w", "memories", "which", "passes", "rows", "marks")]
+        lanes = self.function(f"void @lanes({', '.join(arrays)}, i64 %count, i64 %most, i64 %n) nounwind")
         moving = FunctionWriter(Arithmetic())
         with moving.loop(0, "%count") as k:
-            source, target = (moving.at(f"%{end}", moving.integer("mul", k, f"%{end}.step")) for end in ("from", "to"))
+            source, target = [moving.at(f"%{end}", moving.integer("mul", k, f"%{end}.step")) for end in ("from", "to")]
             moving.store_at(moving.load_at(source), target)
-        return [
-            *moving.function(f"internal void @move({_MOVE}) nounwind"),
-            *self.function(f"void @lanes({_ALL}) nounwind"),
-        ]
+        steps = "i64 %count, i64 %to.step, i64 %from.step"
+        return [*moving.function(f"internal void @move(ptr noalias %to, ptr noalias %from, {steps}) nounwind"), *lanes]
 
     def _register(self, name: str) -> str:
         return self.load_at(self.at("%w", self._places[name]))
@@ -254,8 +254,3 @@ class _LaneWriter(FunctionWriter):
             with self._lanes_of(self.value(moving)) as other:
                 self._move(here, self.lanes, self.at("%w", other, "double"), self.lanes, self._kept)
                 self.store_at(self._integer_at(self._left, other)[1], left, "i64")
-
-
-_ALL = ", ".join([f"ptr noalias %{name}" for name in ("w", "memories", "which", "passes", "rows", "marks")])
-_ALL += ", i64 %count, i64 %most, i64 %n"
-_MOVE = "ptr noalias %to, ptr noalias %from, i64 %count, i64 %to.step, i64 %from.step"

@@ -43,7 +43,7 @@ class PythonRunner(Runner):
 
     @cached_property
     def masked(self) -> Program:
-        """See `many`."""
+        """The program of memories side by side, see `many`."""
         return many(self.program)
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:

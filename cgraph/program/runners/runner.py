@@ -140,19 +140,11 @@ class Runner(ABC):
 
     @abstractmethod
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
-        """Machine code of memories in lanes, see `LaneCode`; none in Python, with a feed, or of what runs alone.
+        """Machine code of memories in lanes; none in Python, with a feed, or of what runs alone.
 
         clock: a register of length 1.  results: registers that are read after a run.  alike: whether a memory has the
         bits that it has alone; else sines and such are those of vectors.
         """
-
-    @abstractmethod
-    def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
-        """A function of nothing, one pass with registers x and y in unchecked arrays; other registers, zeros."""
-
-    @abstractmethod
-    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
-        """The k worth a thread's start, and a writer of records (width, k) of values (length, k) of a register."""
 
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...
