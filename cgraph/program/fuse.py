@@ -18,10 +18,8 @@ from .statement import Statement, row_of
 from .statements.call import Call, Map, Sum, elements, products_in, several
 from .statements.control import If
 
-# Operations of one call: it compiles in some tens of milliseconds, and a short run gains no more.
-MOST_OPERATIONS = 1000
-# Operations by which the code of a graph that several statements call may grow. Beyond, as of the rate in the stages
-# of a step, a call of code that is there once takes no longer, and compiles sooner.
+MOST_OPERATIONS = 1000  # of one call: it compiles in some tens of milliseconds, and a short run gains no more
+# Operations by which the code of a graph that several statements call may grow: beyond, calls take no longer.
 COPIES = 100
 # Elements of a `Map` or `Sum` that becomes straight code, and operations of them all. In vectors fewer instructions do
 # more of them, but a vector of numbers that have just been written one by one waits until the last is in the cache.

@@ -57,20 +57,12 @@ class Functions:
         return self._define(key, "call", text, arithmetic, len(pointers), 0)
 
     def map(
-        self,
-        graph: Graph,
-        shared: Lengths,
-        inputs: Lengths,
-        outputs: Lengths,
-        count: int,
-        apart: Sequence[bool] = (),
-        *,
-        asked: bool = False,
+        self, graph: Graph, shared: Lengths, inputs: Lengths, outputs: Lengths, count: int, apart: Lengths, asked: bool
     ) -> str:
         """y[i] = graph(shared, x[i]) for i = 0 .. count - 1, whose number k in a register is at k count + i.
 
-        apart: the inputs whose numbers have just been written one by one, and so are read: one load of them all would
-        wait until they are in the cache.  asked: the last input says how many elements matter.
+        apart: flags of inputs whose numbers have just been written one by one, and so are read: one load of them all
+        would wait until they are in the cache.  asked: whether the last input says how many elements matter.
         """
         one_each = max((*inputs, *outputs), default=1) <= count
         in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)

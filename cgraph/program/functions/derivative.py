@@ -39,20 +39,15 @@ Chosen = tuple[int, ...] | None  # the numbers of inputs; None for all
 CHECK = 256  # operations that take as long as to look whether slopes are infinite
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 LEAST_BLOCK = 64  # points in a block, a multiple of every processor's vectors
+Bind = Callable[[Array, Array], Callable[[], None]]  # x, y -> a function of nothing
 _Buffers = tuple[Any, Array, memoryview, Callable[[], None]]  # memory of x; y, as an array and as memory; the call
 
 
 class BoundFunction:
     """A function of n_in numbers that gives an array of some shape; any number of threads may call it at once."""
 
-    def __init__(
-        self,
-        bind: Callable[[Array, Array], Callable[[], None]],
-        n_in: int,
-        shape: tuple[int, ...],
-        names: Sequence[str] = (),
-    ) -> None:
-        """bind: may leave zeros of y as they are.  names: of the inputs, for errors."""
+    def __init__(self, bind: Bind, n_in: int, shape: tuple[int, ...], names: Sequence[str] = ()) -> None:
+        """bind: its calls may leave zeros of y as they are.  names: of the inputs, for errors."""
         self._bind, self._sizes, self._names = bind, (n_in, shape), names
         self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
         self._pack, self._unpack = Struct(f"{n_in}d").pack_into, Struct(f"{math.prod(shape)}d").unpack_from
@@ -99,9 +94,7 @@ class BoundFunction:
 class Derivative(NamedTuple):
     """A derivative along directions. Where an entry of a direction is zero, an infinite slope counts for nothing.
 
-    To look at the entries makes the directions' part longer, of second derivatives by a half. With `guarded`, the split
-    that does, the other one need not: `guarded` runs only where a result is infinite or NaN, and elsewhere it would
-    give the same.
+    guarded: the split that looks at entries, if that is much longer: it runs only where a result is infinite or NaN.
     """
 
     split: DirectionSplit
@@ -202,33 +195,26 @@ class DirectionProducts:
 
 
 class MatrixPart(NamedTuple):
-    """Entries that one derivative along sums of unit vectors gives.
-
-    colors: of each unit vector the sum that it is in.  color, result: of each entry, the sum and the number in its
-    results that holds it.  entries: their numbers in the pattern.
-    """
+    """Entries that one derivative along sums of unit vectors gives."""
 
     derivative: Derivative
-    colors: Indices
-    color: Indices
-    result: Indices
-    entries: Indices
+    colors: Indices  # of each unit vector the sum that it is in
+    color: Indices  # of each entry its sum
+    result: Indices  # of each entry its number in the results of that sum
+    entries: Indices  # their numbers in the pattern
 
     def directions(self, lanes: int) -> int:
         """Number of directions, filled up to whole vectors."""
         return -(-int(self.colors.max() + 1) // lanes) * lanes
 
 
+Source = Graph | Sequence[MatrixPart]
+
+
 class ColoredMatrix:
-    """A matrix that depends on a point of `size` numbers, as a program; any number of threads may call it at once.
+    """A matrix of these entries that a graph, or parts, give at points of `size` numbers, for any number of threads."""
 
-    entries: those that can be other than zero.  source: the graph that gives them all, or the parts that do.
-    lanes: the directions in a vector.
-    """
-
-    def __init__(
-        self, entries: Pattern, source: Graph | Sequence[MatrixPart], size: int, lanes: int, ready: Ready
-    ) -> None:
+    def __init__(self, entries: Pattern, source: Source, size: int, lanes: int, ready: Ready) -> None:
         self.entries, self._source, self._size = entries, source, size
         self._parts = () if isinstance(source, Graph) else source
         self._lanes, self._ready, self._full = lanes, ready, full(entries)
@@ -309,10 +295,7 @@ class ColoredMatrix:
 
 
 class Derivatives:
-    """The derivatives of a graph by chosen inputs.
-
-    runner: what runs the graph itself.  ready: makes a program ready to run in the same way.
-    """
+    """The derivatives of a graph, which the runner runs, by chosen inputs; programs are made ready in the same way."""
 
     def __init__(self, graph: Graph, ready: Ready, runner: AnyRunner) -> None:
         self._original, self._ready, self._size = graph, ready, len(graph.inputs)
@@ -330,7 +313,7 @@ class Derivatives:
         source = self._jacobian_source(entries, chosen) if len(entries.rows) else ()
         return ColoredMatrix(entries, source, self._size, self._lanes, self._ready)
 
-    def _jacobian_source(self, entries: Pattern, chosen: Chosen) -> Graph | Sequence[MatrixPart]:
+    def _jacobian_source(self, entries: Pattern, chosen: Chosen) -> Source:
         wrt, coloring = self._wrt(chosen), jacobian_coloring(entries, LANES)
         once, columns, rows = written_sizes(self._graph, wrt)
         if min(columns, rows) <= once * coloring.vectors(LANES) * self.vector_cost:

@@ -24,6 +24,7 @@ from .runner import offsets
 
 ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0)"  # a pass without a record
 Source = Callable[[Program, Arithmetic], str]  # writes the module with `run`
+Compiling = Callable[[str, int], Code]  # compiles a text in vectors of so many lanes
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 _LANES = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 6, *[ctypes.c_int64] * 3)
 _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
@@ -44,7 +45,7 @@ class BatchCode:
     def __call__(self, points: Array, result: Array) -> None:
         """Results, (n_out, k), of points, (n_in, k), both in rows or both in columns."""
         rows = self._columns is None or lies_in_rows(points)
-        axis, order = (1, "F") if rows else (0, "C")
+        axis, order, count = int(rows), "F" if rows else "C", points.shape[1]
         if points.strides[1 - axis] != points.itemsize or not points.flags.aligned:
             points = np.array(points, order=order)  # type: ignore[call-overload]
         if result.strides[1 - axis] != result.itemsize or not result.flags.aligned:
@@ -52,12 +53,12 @@ class BatchCode:
             self(points, values)
             result[...] = values
             return
-        count = points.shape[1]
         whole = count - count % self._lanes
         if whole:
             self._run(points, result, whole, axis)
         if whole < count:  # the last few, filled up to a whole vector by repeating one
-            filled = np.array(points[:, np.minimum(np.arange(whole, whole + self._lanes), count - 1)], order=order)  # type: ignore[call-overload]
+            last = points[:, np.minimum(np.arange(whole, whole + self._lanes), count - 1)]
+            filled = np.array(last, order=order)  # type: ignore[call-overload]
             values = np.empty((len(result), self._lanes), order=order)  # type: ignore[call-overload]
             self._run(filled, values, self._lanes, axis)
             result[:, whole:] = values[:, : count - whole]
@@ -95,15 +96,20 @@ class LaneCode:
     """Machine code of memories in lanes: each runs until its own stop, and another then takes its lane.
 
     numbers: {register: place in the row of a memory}, of those registers that outlive a pass.  size: of such a row.
-    Any number of threads may call it at once, on rows of their own.
     """
 
-    def __init__(self, code: Code, program: Program, kept: Sequence[str], size: int) -> None:
-        self._entry = code.function("lanes", _LANES)
+    def __init__(
+        self, program: Program, kept: Sequence[str], clock: str, how: Arithmetic, source: Source, compiled: Compiling
+    ) -> None:
+        """program: its first registers are those `kept` between passes.  clock: a register, see `__call__`."""
+        program = fused(many_keeping(program, kept), alike=how.alike)
         places = offsets(program.registers, 1)
         self.numbers = {name: slice(places[name], places[name] + program.registers[name]) for name in kept}
         self.size, self.width = sum([program.registers[name] for name in kept]), program.width
-        self._memory = size
+        self._memory = how.lanes * places[""]
+        text = source(replace(program, record=(), record_if=None, stop=None), how)
+        lines = _LaneWriter(program, self.size, clock, how).definitions()
+        self._entry = compiled("\n".join([text, *lines, ""]), how.lanes).function("lanes", _LANES)
 
     def __call__(self, memories: Array, which: Counts, passes: Counts, most: int, rows: Array, marks: Array) -> None:
         """Run the memories that `which` names, rows of `memories` (N, size), at most so many passes each.
@@ -118,21 +124,8 @@ class LaneCode:
         self._entry(*[array.ctypes.data for array in arrays], len(which), most, len(marks))
 
 
-def lane_ir(
-    program: Program, kept: Sequence[str], clock: str, arithmetic: Arithmetic, source: Source
-) -> tuple[Program, Batch]:
-    """The program under masks, and its module with `lanes`, see `LaneCode`; its first registers, `kept`, stay."""
-    program = fused(many_keeping(program, kept), alike=arithmetic.alike)
-    text = source(replace(program, record=(), record_if=None, stop=None), arithmetic)
-    lines = _LaneWriter(program, sum([program.registers[name] for name in kept]), clock, arithmetic).definitions()
-    return program, Batch("\n".join([text, *lines, ""]), arithmetic.lanes * offsets(program.registers, 1)[""])
-
-
 class _LaneWriter(FunctionWriter):
-    """The function `lanes`: passes of memories, each of which begins in a lane where another one has ended.
-
-    Number k of row j of an array of rows lies next to the one before, that of a lane as many apart as there are lanes.
-    """
+    """The function `lanes`: passes of memories, each of which begins in a lane where another one has ended."""
 
     def __init__(self, program: Program, kept: int, clock: str, arithmetic: Arithmetic) -> None:
         super().__init__(arithmetic)

@@ -167,8 +167,7 @@ class NativeRunner(Runner):
         kept = [name for name in lengths if name in first]
         program = replace(self._fused, registers={name: lengths[name] for name in dict.fromkeys([*kept, *lengths])})
         with without_collection():
-            masked, text = self._side.lane_ir(program, kept, clock, arithmetic, program_ir)
-        code: LaneCode = self._side.LaneCode(self._compiled(text.source, self.lanes), masked, kept, text.size)
+            code: LaneCode = self._side.LaneCode(program, kept, clock, arithmetic, program_ir, self._compiled)
         return code
 
     def text(self, x: str) -> str:

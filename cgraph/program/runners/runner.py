@@ -97,13 +97,11 @@ class Runner(ABC):
         """Run passes, fewer if the program stops, and record a row after each `every`th.
 
         memory: float64 (size,), changed in place: the next run continues from it. Or N memories (size, N), which run
-        side by side in vectors, as each does alone, whichever course it takes; the last axis counts them, as in
-        `Compiled.batch`, and rows of the record are (rows, width, N).
-        feed: (passes, feed_width), of a program with a feed, what its registers are before each pass; of N memories
+        side by side in vectors, each as it does alone; rows of the record are then (rows, width, N).
+        feed: (passes, feed_width), what the registers of the program's feed are before each pass; of N memories
         (passes, feed_width, N), or (passes, feed_width, 1) for all.
         Raises GraphError for a memory or a feed of another shape or type, or a number out of range; for N memories of a
-        program with `record_if` or `stop`, by which they would have other numbers of rows or passes, or with statements
-        that run one memory alone.
+        program with `record_if` or `stop`, or with statements that run one memory alone.
         """
         many = memory.shape[1:] if isinstance(memory, np.ndarray) and memory.ndim == 2 else ()
         require_memory("a memory", memory, (self.size, *many))
@@ -121,9 +119,8 @@ class Runner(ABC):
         """A function of nothing: `run` on this memory, len(rows) passes, which writes the rows.
 
         Without rows a function of a number of passes, which records nothing. The arrays, float64 (size,) and
-        (passes, width), are checked here and never again; the function keeps them alive. Registers may be written
-        between calls, such as through `read`. A pass that records nothing leaves the last rows as they were. One thread
-        at a time may call it.
+        (passes, width), are checked here and never again; the function keeps them alive. One thread at a time may call
+        it; between calls registers may be written. A pass that records nothing leaves the last rows as they were.
         Raises GraphError for an array of another shape or type, or a program with a feed.
         """
         if self.program.feed:
