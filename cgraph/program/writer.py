@@ -186,7 +186,7 @@ class Writer(FunctionWriter):
         """Statements, one after another."""
         for statement in statements:
             text = row_of(statement).text
-            assert text is not None, "require_texts has been asked"
+            assert text is not None, "the runner has asked"
             text(statement, self)
             self.before = statement
 

@@ -67,8 +67,8 @@ class Compiled(BoundFunction):
         self.source = self._runner.text("x")
         super().__init__(self._bound, self.n_in, (self.n_out,), graph.input_names)
         self._derivatives = Derivatives(graph, ready, self._runner)
-        if isinstance(self._runner, PythonRunner) and (on_lists := self._runner.on_lists("x")) is not None:
-            self.values = on_lists  # type: ignore[method-assign]  # without arrays on the way
+        if isinstance(self._runner, PythonRunner) and backend != "numpy":
+            self.values = self._runner.on_floats(graph)  # type: ignore[method-assign]  # without arrays on the way
 
     def batch(self, X: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
         """Values of the outputs, (n_out, N), at N points X, (n_in, N).
@@ -84,8 +84,7 @@ class Compiled(BoundFunction):
         if points.ndim != 2 or points.shape[0] != self.n_in:
             raise GraphError(f"X must have shape ({self.n_in}, N), one row for each input, got {points.shape}")
         total = points.shape[1]
-        order = "F" if self._runner.takes_rows and lies_in_rows(points) else "C"
-        result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
+        result = np.empty((self.n_out, total), order="F" if lies_in_rows(points) else "C") if out is None else out
         if out is not None:
             require_out(out, (self.n_out, total), points)
         write_batch(*self._runner.columns("x"), points, result, count)
@@ -122,10 +121,8 @@ class Compiled(BoundFunction):
     def _c_entry(self) -> CEntry:
         """The machine code as functions of C."""
         if not isinstance(self._runner, NativeRunner):
-            raise RuntimeError(
-                f"an address needs machine code, and this is generated Python, backend {self.backend!r}: "
-                "cg.compile(graph, 'llvm') says what is missing"
-            )
+            problem = f"an address needs machine code, and this is generated Python, backend {self.backend!r}"
+            raise RuntimeError(f"{problem}: cg.compile(graph, 'llvm') says what is missing")
         return c_entry(self._runner.point("x", "y")[1], self.n_in, self.n_out)
 
     def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:

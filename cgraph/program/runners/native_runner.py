@@ -47,7 +47,7 @@ _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no 
 class NativeRunner(Runner):
     """A program as machine code. Any number of threads may run it at once, on a memory each."""
 
-    takes_rows, vectors = True, 17
+    vectors = 17
 
     def __init__(self, program: Program, *, fast: bool = False, fma: bool = True, cache: Cache | None = None) -> None:
         host = llvm.host()

@@ -93,7 +93,7 @@ class PythonRunner(Runner):
             if self._backend == "numpy":
                 columns = self._on_arrays(graph), point[:, None], flat[:, None]
                 return lambda: columns[0](*columns[1:]), arrays
-            function = self._on_floats(graph)
+            function = self.on_floats(graph)
 
             def call() -> None:
                 flat[:] = function(point.tolist())
@@ -124,7 +124,7 @@ class PythonRunner(Runner):
             return STATES, write
         if self._backend != "python":
             return BLOCK, self._on_arrays(graph)
-        function = self._on_floats(graph)
+        function = self.on_floats(graph)
 
         def one_by_one(points: Array, result: Array) -> None:
             for column, x in enumerate(points.T.tolist()):
@@ -138,15 +138,11 @@ class PythonRunner(Runner):
 
     def text(self, x: str) -> str:
         """The text of one graph in Python, or in NumPy; of other programs their listing."""
-        graph, of = whole_graph(self.program, x), self._on_arrays if self._backend == "numpy" else self._on_floats
+        graph, of = whole_graph(self.program, x), self._on_arrays if self._backend == "numpy" else self.on_floats
         return self.program.listing() if graph is None else of(graph).source
 
-    def on_lists(self, x: str) -> OnFloats | None:
-        """The function of lists, of one graph."""
-        graph = whole_graph(self.program, x)
-        return None if self._backend == "numpy" or graph is None else self._on_floats(graph)
-
-    def _on_floats(self, graph: Graph) -> OnFloats:
+    def on_floats(self, graph: Graph) -> OnFloats:
+        """The graph as a function of a list."""
         return self._functions.get(id(graph)) or self._functions.setdefault(id(graph), OnFloats(graph))
 
     def _on_arrays(self, graph: Graph) -> OnArrays:
@@ -154,7 +150,7 @@ class PythonRunner(Runner):
         return self._arrays.get(id(graph)) or self._arrays.setdefault(id(graph), OnArrays(graph, exact=exact))
 
     def _at(self, graph: Graph, x: Sequence[float]) -> Sequence[float]:
-        return self._on_floats(graph)(x)
+        return self.on_floats(graph)(x)
 
     def _batch(self, graph: Graph, points: Array) -> Array:
         result, function = np.empty((len(graph.outputs), points.shape[1])), self._on_arrays(graph)

@@ -52,7 +52,6 @@ class Runner(ABC):
     # Directions in a vector, and vectors in a block: odd, since rows a power of two apart would share few cache lines.
     lanes, vectors = 8, 513
     vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
-    takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
 
     def __init__(self, program: Program, width: int = 1) -> None:
         self.program, self.width = program, width
