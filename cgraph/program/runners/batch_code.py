@@ -120,7 +120,7 @@ class LaneCode:
         """
         memory = aligned(self._memory)
         memory[:] = 0.0
-        arrays = (memory, memories, which, passes, rows, marks)
+        arrays = (memory, memories, which, passes, rows, np.append(marks, math.nan))
         self._entry(*[array.ctypes.data for array in arrays], len(which), most, len(marks))
 
 
@@ -191,13 +191,11 @@ class _LaneWriter(FunctionWriter):
         """The address of a row of numbers."""
         return self.at(base, self.integer("mul", row, width), kind)
 
-    def _set_due(self, lane: str, mark: str) -> str:
-        """Set the next mark of a lane, infinite behind the last; whether there is one."""
-        due, there = self.at(self._due, lane, "double"), self.integer("icmp slt", mark, "%n")
-        self.store_at(bits(math.inf), due, "double")
-        with self.when(there):
-            self.store_at(self.load_at(self.at("%marks", mark, "double"), "double"), due, "double")
-        return there
+    def _set_due(self, lane: str, passed: str) -> str:
+        """Set the next mark of a lane, NaN behind the last; passed: the address of how many there were."""
+        mark = self.load_at(self.at("%marks", self.load_at(passed, "i64"), "double"), "double")
+        self.store_at(mark, self.at(self._due, lane, "double"), "double")
+        return mark
 
     def _record_lanes(self) -> None:
         """A row in the lanes whose clock has reached a mark, where a row is wanted."""
@@ -216,8 +214,7 @@ class _LaneWriter(FunctionWriter):
             here = self.load_at(self.at(self.at("%w", self._places[self._clock]), lane, "double"), "double")
             with self.repeat() as skipped:  # marks that it has passed at once
                 self.change(passed, "add 1")
-                self.leave_unless(self._set_due(lane, self.load_at(passed, "i64")), skipped)
-                due = self.load_at(self.at(self._due, lane, "double"), "double")
+                due = self._set_due(lane, passed)
                 self.leave_unless(self.value(f"fcmp ole double {due}, {here}"), skipped)
 
     def _give_back(self, lane: str) -> None:
@@ -240,7 +237,7 @@ class _LaneWriter(FunctionWriter):
             self.store_at(new, self.at(self._holds, lane, "i64"), "i64")
             self.store_at("%most", left, "i64")
             self._move(here, self.lanes, self._row("%memories", new, self._kept), 1, self._kept)
-            self._set_due(lane, self._integer_at(self._row("%passes", new, 2, "i64"), "1")[1])
+            self._set_due(lane, self.at(self._row("%passes", new, 2, "i64"), "1", "i64"))
             otherwise()
             self.store_at(bits(math.inf), self.at(self._due, lane, "double"), "double")
             moving = f"icmp sge {self._integers} {self.load_at(self._holds, self._integers)}, zeroinitializer"
