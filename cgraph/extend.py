@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from .program.derivatives.transpose import program_vjp as program_vjp
     from .program.many import many as many
     from .program.program import Program as Program
-    from .program.runners.choose_runner import runner as runner
+    from .program.runners.native_runner import runner as runner
     from .program.runners.runner import Runner as Runner
     from .program.statement import (
         STATEMENTS as STATEMENTS,

@@ -39,7 +39,7 @@ OPTIONAL = {
 # {file::function: why it imports one of ours}. All others import at the top.
 LAZY = {
     "cgraph/__init__.py::_of_row": "`import cgraph` loads NumPy alone",
-    "cgraph/program/runners/choose_runner.py::runner": "programs are Python only if there is no machine code",
+    "cgraph/program/runners/native_runner.py::runner": "programs are Python only if there is no machine code",
     "cgraph/program/runners/native_runner.py::_side": "a program of one memory does without",
     "dynamics/equations/formulations/formulations.py::_remarks": "loaded when a notebook asks",
     "dynamics/integrators/problem.py::momentum_form": "most motions are of velocities",

@@ -384,11 +384,9 @@ CALLS |= {
     "extend.Names.group": call(NAMES.group, "x"),
     **{f"extend.Names.{name}": call(getattr(NAMES, name), "x", "a node") for name in ("all", "one", "output")},
     "extend.Program": call(extend.Program, {"x": 1}, [HALF], ["x"], record_if="x", stop="x", feed=["x"]),
-    "extend.Runner.batch": call(RUNNER.batch, "x", [[1.0]], 1, out=None),
     "extend.Runner.bind": call(RUNNER.bind, np.zeros(1), np.zeros((2, 1))),
     "extend.Runner.memory": call(RUNNER.memory, {"x": 1.0}, None),
     "extend.Runner.run": call(FED.run, np.zeros(1), 2, 1, np.zeros((2, 1))),
-    "extend.Runner.run_many": call(FED.run_many, np.zeros((1, 3)), 2, 1, np.zeros((2, 1, 3))),
     "extend.Solve": call(a_program_of(extend.Solve), "x", "y", "z"),
     "extend.Sum": call(a_program_of(extend.Sum), HALVE, ("x",), ("y",)),
     "extend.While": call(a_program_of(extend.While), "x", (HALF,)),
@@ -465,9 +463,9 @@ LEFT_OUT = """cg.as_jax cg.to_casadi cg.to_jax cg.to_torch cg.recording_lines cg
     cg.Graph.counts cg.Graph.listing cg.Graph.only_output dyn.System.braking dyn.System.changed
     dyn.System.mass_matrix dyn.System.require_known dyn.System.require_values dyn.JointForce.along
     dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along dyn.JointFriction.check
-    dyn.Actuator.along dyn.Actuator.check extend.Builder extend.Runner extend.require_length extend.Runner.advancing
+    dyn.Actuator.along dyn.Actuator.check extend.Builder extend.Runner extend.require_length
     extend.Runner.read extend.Runner.write extend.effects extend.Runner.lane_code extend.Formulas.lines
-    extend.Runner.text extend.Runner.bind_pass extend.Runner.columns extend.Program.listing
+    extend.Runner.text extend.Program.listing
     extend.Names.called extend.Names.formula extend.Names.inputs_of extend.Names.line extend.Names.meant
     extend.Names.short extend.Names.shown extend.Names.text"""
 
@@ -639,7 +637,7 @@ CASES = {
         "mass must be finite",
     ),
     "info of no coordinate": (lambda: dyn.raise_if_singular(ARM, 7.0), "from 1 to 1 for a coordinate, got 7"),
-    "rows without room": (lambda: RUNNER.run(np.ones((1, 1)), 10**12), "do not fit in memory"),
+    "rows without room": (lambda: RUNNER.run(np.ones((1, 1)), 10**12), "Unable to allocate"),
     "half a link": (lambda: dyn.scenes.load("chain", n=2.5), "at least one link, got 2.5"),
     "kind of a joint": (lambda: dyn.Joint("cogwheel"), "must be one of ball, fixed, free, free (body axes), "),
     "start too long": (lambda: dyn.scenes.Scene("s", "", ARM, (0.0, 0.0), (0.0,), 1.0), "q needs 1 finite numbers"),

@@ -18,10 +18,8 @@ from .statement import Statement, row_of
 from .statements.call import Call, Map, Sum, elements, products_in, several
 from .statements.control import If
 
-# Operations of one call: it compiles in some tens of milliseconds, and a short run gains no more.
-MOST_OPERATIONS = 1000
-# Operations by which the code of a graph that several statements call may grow. Beyond, as of the rate in the stages
-# of a step, a call of code that is there once takes no longer, and compiles sooner.
+MOST_OPERATIONS = 1000  # of one call: it compiles in some tens of milliseconds, and a short run gains no more
+# Operations by which the code of a graph that several statements call may grow: beyond, calls take no longer.
 COPIES = 100
 # Elements of a `Map` or `Sum` that becomes straight code, and operations of them all. In vectors fewer instructions do
 # more of them, but a vector of numbers that have just been written one by one waits until the last is in the cache.
@@ -29,57 +27,46 @@ FEW_ELEMENTS, STRAIGHT = 8, 200
 
 
 def fused(program: Program, *, alike: bool = False) -> Program:
-    """The program with short calls, maps and sums that follow one another as one call.
+    """The program with short calls, maps and sums that follow one another as one call, products rounded as before.
 
-    Long ones stay as they are. What is computed alike is there once. Products are rounded where they were, so that
-    results have the same bits wherever functions of the C library are not joined with others.
-    alike: whether functions of the C library are joined with those that they are joined with already, and no others.
+    alike: whether calls of functions of the C library stay with those that they are joined with, to the bit.
     """
     uses = Counter([id(each.graph) for each in program.statements() if isinstance(each, Call)])
-    return replace(program, body=_fused(program, program.body, uses, alike=alike))
+
+    def joined(statements: Sequence[Statement]) -> tuple[Statement, ...]:
+        done: list[Statement] = []
+        run: list[Call | Map | Sum] = []
+        size = 0.0
+        for statement in statements:
+            work = _work(statement, program, uses, alike)
+            if size + work > MOST_OPERATIONS:
+                done += _one_call(program, run)
+                run, size = [], 0.0
+            if isinstance(statement, Call | Map | Sum) and work <= MOST_OPERATIONS:
+                run.append(statement)
+                size += work
+                continue
+            names = () if isinstance(statement, If) and statement.seldom else row_of(statement).bodies
+            bodies = {name: joined(getattr(statement, name)) for name in names}
+            done.append(replace(statement, **bodies) if bodies else statement)  # type: ignore[type-var]
+        return (*done, *_one_call(program, run))
+
+    return replace(program, body=joined(program.body))
 
 
-def _fused(
-    program: Program, statements: Sequence[Statement], uses: Counter[int], *, alike: bool
-) -> tuple[Statement, ...]:
-    done: list[Statement] = []
-    run: list[Call | Map | Sum] = []
-    size = 0.0
-    for statement in statements:
-        work = _work(statement, program, uses)
-        if alike and isinstance(statement, Map | Sum) and not _as_before([statement]):
-            work = math.inf
-        if size + work > MOST_OPERATIONS or (alike and not _as_before([*run, statement])):
-            done += _one_call(program, run)
-            run, size = [], 0.0
-        if isinstance(statement, Call | Map | Sum) and work <= MOST_OPERATIONS:
-            run.append(statement)
-            size += work
-            continue
-        names = () if isinstance(statement, If) and statement.seldom else row_of(statement).bodies
-        bodies = {name: _fused(program, getattr(statement, name), uses, alike=alike) for name in names}
-        done.append(replace(statement, **bodies) if bodies else statement)  # type: ignore[type-var]
-    return (*done, *_one_call(program, run))
-
-
-def _as_before(run: Sequence[Statement]) -> bool:
-    """Whether functions that may be joined have no other company in one call than in one that is there."""
-    straight = [each for each in run if isinstance(each, Call | Map | Sum)]
-    joining = [each for each in straight if any(columns(node.op).vector for node in each.graph.nodes)]
-    return not joining or (len(joining) == 1 and isinstance(joining[0], Call))
-
-
-def _work(statement: Statement, program: Program, uses: Counter[int]) -> float:
+def _work(statement: Statement, program: Program, uses: Counter[int], alike: bool) -> float:
     """The operations of a statement, infinite where it stays as it is."""
     if not isinstance(statement, Call | Map | Sum) or (isinstance(statement, Call) and statement.exact):
+        return math.inf
+    if alike and any(columns(node.op).vector for node in statement.graph.nodes):
         return math.inf
     size = sum([1 for node in statement.graph.nodes if node.args])
     if isinstance(statement, Call):
         return size if (uses[id(statement.graph)] - 1) * size <= COPIES else math.inf
     count = elements(statement, program.registers)
-    if several(statement, program.registers):
+    if several(statement, program.registers) or count > FEW_ELEMENTS or size * count > STRAIGHT:
         return math.inf
-    return size * count if count <= FEW_ELEMENTS and size * count <= STRAIGHT else math.inf
+    return size * count
 
 
 def _one_call(program: Program, run: Sequence[Call | Map | Sum]) -> Sequence[Call | Map | Sum]:
@@ -108,7 +95,12 @@ class _Registers:
             given = [value for name in statement.inputs for value in self._values(name)]
             values = self._applied(statement.graph, given, products_in(statement))
         else:
-            rows, outputs = self._rows(statement), len(statement.graph.outputs)
+            count, products = elements(statement, self._lengths), products_of(statement.graph)
+            shared = [value for name in statement.shared for value in self._values(name)]
+            each = [self._values(name) for name in statement.inputs]
+            points = [[*shared, *[values[i if len(values) == count else 0] for values in each]] for i in range(count)]
+            rows = [self._applied(statement.graph, point, products) for point in points]
+            outputs = len(statement.graph.outputs)
             if isinstance(statement, Map):
                 values = [row[k] for k in range(outputs) for row in rows]
             else:
@@ -126,14 +118,6 @@ class _Registers:
         graph = Graph(inputs, {f"{k}": value for k, value in enumerate(outputs)})
         products = None if self._products == products_of(graph) else self._products
         return Call(graph, tuple(self._read), tuple(self._written), products)
-
-    def _rows(self, statement: Map | Sum) -> list[list[Node]]:
-        """The outputs for every element."""
-        count, products = elements(statement, self._lengths), products_of(statement.graph)
-        shared = [value for name in statement.shared for value in self._values(name)]
-        columns = [self._values(name) for name in statement.inputs]
-        points = [[*shared, *[column[i if len(column) == count else 0] for column in columns]] for i in range(count)]
-        return [self._applied(statement.graph, point, products) for point in points]
 
     def _values(self, name: str) -> list[Node]:
         if name in self._written:

@@ -17,11 +17,9 @@ Text = Callable[[FunctionWriter, str], None]  # what writes a function of that n
 
 
 class Functions:
-    """The functions of one module, each written once.
+    """The functions of one module, each written once: `void f(in0, in1, .., out0, out1, ..)`, pointers to registers.
 
-    Every function takes pointers to registers, inputs first: `void f(in0, in1, .., out0, out1, ..)`.
-    definitions: the lines of all functions.  width: of the vectors in which `map` goes through its elements.
-    quick: whether what is defined is to be compiled in little time, for it seldom runs.
+    width: of the vectors in which `map` goes through its elements.  quick: whether to compile in little time.
     """
 
     def __init__(self, arithmetic: Arithmetic, width: int) -> None:
@@ -42,9 +40,7 @@ class Functions:
     ) -> str:
         """y = graph(x), where of its registers some, end to end, are x, and some y; a register may be both.
 
-        products: see `instructions`.  exact: no product is joined with a sum.
-        begins: where the registers lie in the memory, whose address is then the function's one argument: addresses are
-        constants of the instructions. Without, each register has an argument.
+        begins: places of the registers in the memory, the function's one argument: addresses are constants then.
         """
         arithmetic = self.arithmetic.unfused if exact else self.arithmetic
         pointers = ["%in0"] if begins else [f"%in{k}" for k in range(len(registers))]
@@ -55,27 +51,18 @@ class Functions:
         again = {row for row, place in enumerate(y) if place in known}
 
         def text(ir: FunctionWriter, name: str) -> None:
-            self._body(ir, name, graph, x, y, pointers, products=products, last=again)
+            self._body(ir, name, graph, {"x": x, "y": y}, pointers, products=products, last=again)
 
         key = (id(graph), registers, tuple(reads), tuple(writes), exact, begins)
         return self._define(key, "call", text, arithmetic, len(pointers), 0)
 
     def map(
-        self,
-        graph: Graph,
-        shared: Lengths,
-        inputs: Lengths,
-        outputs: Lengths,
-        count: int,
-        apart: Sequence[bool] = (),
-        *,
-        asked: bool = False,
+        self, graph: Graph, shared: Lengths, inputs: Lengths, outputs: Lengths, count: int, apart: Lengths, asked: bool
     ) -> str:
         """y[i] = graph(shared, x[i]) for i = 0 .. count - 1, whose number k in a register is at k count + i.
 
-        Where it can, a vector of elements at a time; results beyond the last one go to the register's padding.
-        apart: the inputs whose numbers have just been written one by one, and so are read: one load of them all would
-        wait until they are in the cache.  asked: the last input says how many elements matter.
+        apart: flags of inputs whose numbers have just been written one by one, and so are read: one load of them all
+        would wait until they are in the cache.  asked: whether the last input says how many elements matter.
         """
         one_each = max((*inputs, *outputs), default=1) <= count
         in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
@@ -84,6 +71,14 @@ class Functions:
         same = [k for k, length in enumerate(inputs) if length == 1 != count]
         gathered = [k for k, each in enumerate(apart) if each and in_vectors and inputs[k] == count]
         first, one, vector = len(shared), self.arithmetic.type, arithmetic.type
+        size = min(count, self.width)
+
+        def gather(_: Arithmetic) -> list[str]:  # a vector by a load for each number, of which LLVM would make one
+            ir, found = FunctionWriter(self.arithmetic), "poison"
+            for lane in range(size):
+                number = ir.value(f"load volatile double, ptr {ir.at('%x', lane)}, align 8")
+                found = ir.value(f"insertelement {vector} {found}, double {number}, i32 {lane}")
+            return ir.function(f"internal {vector} @gathered{size}(ptr %x) nounwind noinline", f"{vector} {found}")
 
         def text(ir: FunctionWriter, name: str) -> None:
             common, found = [f"%in{k}" for k in range(first)], [f"%in{first + k}" for k in range(len(inputs))]
@@ -91,64 +86,37 @@ class Functions:
                 number = ir.spread(ir.load_at(found[k], "double"))
                 found[k] = ir.room()
                 ir.store_at(number, found[k])
-            gather = self._gather(vector, min(count, self.width)) if gathered else ""
-            brought = {k: ir.room() for k in gathered}
-            end = self._asked(ir, f"%in{first + len(inputs)}", count) if asked and self.arithmetic.lanes == 1 else count
+            brought = {k: ir.room() for k in gathered if self.text(f"gathered{size}", gather)}
+            end: str | int = count
+            if asked and self.arithmetic.lanes == 1:  # from one to count
+                number = ir.load_at(f"%in{first + len(inputs)}", "double")
+                for relation, limit in (("ogt", "1.0"), ("olt", f"{count}.0")):
+                    inside = ir.value(f"fcmp {relation} double {number}, {limit}")
+                    number = ir.value(f"select i1 {inside}, double {number}, double {limit}")
+                end = ir.value(f"fptosi double {number} to i64")
             with ir.loop(0, end, arithmetic.lanes if in_vectors else 1) as i:
                 for k in gathered:
-                    ir.store_at(ir.value(f"call {vector} @{gather}(ptr {ir.at(found[k], i, one)})"), brought[k])
+                    ir.store_at(ir.value(f"call {vector} @gathered{size}(ptr {ir.at(found[k], i, one)})"), brought[k])
                 sources = [brought.get(k, at if k in same else ir.at(at, i, one)) for k, at in enumerate(found)]
                 targets = [ir.at(f"%out{k}", i, one) for k in range(len(outputs))]
                 x = [place for at, length in zip(common, shared, strict=True) for place in _places(one, at, 0, length)]
                 for k, (at, length) in enumerate(zip(sources, inputs, strict=True)):
                     x += _places(one, at, 0, max(1, length // count), 0 if k in same else count)
-                y = [
-                    place
-                    for at, length in zip(targets, outputs, strict=True)
-                    for place in _places(one, at, 0, length // count, count)
-                ]
+                y = [p for at, n in zip(targets, outputs, strict=True) for p in _places(one, at, 0, n // count, count)]
                 uniform = sum(shared) if in_vectors else 0
-                self._body(ir, name, graph, x, y, [*common, *sources, *targets], uniform=uniform)
+                self._body(ir, name, graph, {"x": x, "y": y}, [*common, *sources, *targets], uniform=uniform)
 
         key = ("map", id(graph), shared, inputs, outputs, count, tuple(gathered), asked)
         return self._define(key, "map", text, arithmetic, first + len(inputs) + asked, len(outputs))
 
-    @staticmethod
-    def _asked(ir: FunctionWriter, register: str, count: int) -> str:
-        """The number of elements that a register asks for, from one to `count`."""
-        number, t = ir.load_at(register, "double"), "double"
-        for relation, bound in (("ogt", 1), ("olt", count)):
-            limit = f"{float(bound)!r}"
-            inside = ir.value(f"fcmp {relation} {t} {number}, {limit}")
-            number = ir.value(f"select i1 {inside}, {t} {number}, {t} {limit}")
-        return ir.value(f"fptosi {t} {number} to i64")
-
-    def _gather(self, t: str, size: int) -> str:
-        """`x -> the vector of x[0], .., x[size - 1]`, by a load for each, of which LLVM would make one."""
-        name = f"gathered{size}"
-
-        def text(arithmetic: Arithmetic) -> list[str]:
-            ir, vector = FunctionWriter(arithmetic), "poison"
-            for lane in range(size):
-                number = ir.value(f"load volatile double, ptr {ir.at('%x', lane)}, align 8")
-                vector = ir.value(f"insertelement {t} {vector}, double {number}, i32 {lane}")
-            return ir.function(f"internal {t} @{name}(ptr %x) nounwind noinline", f"{t} {vector}")
-
-        return self.text(name, text)
-
     def total(self, count: int) -> str:
         """y = x[0] + .. + x[count - 1], added up in this order from 0."""
-        t = self.arithmetic.type
 
         def text(ir: FunctionWriter, _: str) -> None:
-            if not count:
-                ir.store_at(ir.number(0.0), "%out0")
-                return
+            ir.store_at(ir.number(0.0), "%out0")
             with ir.loop(0, count) as i:
-                before = f"[ {ir.number(0.0)}, %start ], [ {i}.total, %{i[1:]}.again ]"
-                ir.line(f"{i}.sum = phi {t} {before}")
-                ir.line(f"{i}.total = fadd {t} {i}.sum, {ir.load_at(ir.at('%in0', i))}")
-            ir.store_at(f"{i}.total", "%out0")
+                term = ir.load_at(ir.at("%in0", i))
+                ir.store_at(ir.value(f"fadd {ir.type} {ir.load_at('%out0')}, {term}"), "%out0")
 
         return self._define(("total", count), "total", text, self.arithmetic, 1, 1)
 
@@ -166,18 +134,9 @@ class Functions:
 
         return self._define(("take", *map(tuple, tables)), "take", text, self.arithmetic, 1, 1)
 
-    def _body(
-        self,
-        ir: FunctionWriter,
-        name: str,
-        graph: Graph,
-        x: Sequence[str],
-        y: Sequence[str],
-        pointers: Sequence[str],
-        **how: Any,
-    ) -> None:
-        """The graph in a function of that name, after what it calls; arguments: see `write_graph`."""
-        for line in write_graph(ir, name, graph, {"x": x, "y": y}, pointers, **how):
+    def _body(self, ir: FunctionWriter, name: str, *graph: Any, **how: Any) -> None:
+        """What computes a graph in a function of that name, see `write_graph`, behind what it calls."""
+        for line in write_graph(ir, name, *graph, **how):
             quick = self.quick and line.startswith("define")
             self.definitions.append(line.replace("noinline {", "noinline optnone {") if quick else line)
 
@@ -204,16 +163,15 @@ class Functions:
 
 
 def _places(t: str, pointer: str, begin: int, count: int, step: int = 1) -> list[str]:
-    """Places of so many numbers of a register."""
+    """Places of numbers of a register."""
     return [f"{t}, ptr {pointer}, i64 {begin + k * step}" for k in range(count)]
 
 
 class Writer(FunctionWriter):
     """The statements of a function over registers, as LLVM's text.
 
-    functions: those of the module, which statements call.  size: of a number in a register, in bytes.
-    pointers: {register: its address}.  before: the statement that has been written last.
-    offsets: {register: its place in %memory}, where they all lie there.  alone: ids of graphs that one statement calls.
+    size: bytes of a number.  before: the statement written last.  offsets: {register: its place in %memory}.
+    alone: ids of graphs that one statement calls.
     """
 
     def __init__(self, registers: Registers, functions: Functions) -> None:
@@ -228,7 +186,7 @@ class Writer(FunctionWriter):
         """Statements, one after another."""
         for statement in statements:
             text = row_of(statement).text
-            assert text is not None, "require_texts has been asked"
+            assert text is not None, "the runner has asked"
             text(statement, self)
             self.before = statement
 
@@ -258,21 +216,11 @@ class Writer(FunctionWriter):
         return self.some(self.compare("ogt", self.load(register), 0.0))
 
     def calls(self, name: str, inputs: Sequence[str], outputs: Sequence[str]) -> None:
-        """Call a function of registers, whose arguments must not overlap.
-
-        A register that it both reads and writes is written to scratch memory, and copied after the call.
-        """
-        targets, copies = [], []
-        for output in outputs:
-            target, length = self.pointers[output], self.registers[output]
-            if output in inputs:
-                beside = self.beside(length)
-                copies.append(copied_bytes(target, beside, length * self.size))
-                target = beside
-            targets.append(target)
-        self.call(name, [*[self.pointers[register] for register in inputs], *targets])
-        for copy in copies:
-            self.line(copy)
+        """Call a function of registers; one that it also reads is written to scratch memory, and copied after."""
+        beside = {output: self.beside(self.registers[output]) for output in outputs if output in inputs}
+        self.call(name, [*map(self.pointer, inputs), *[beside.get(each) or self.pointer(each) for each in outputs]])
+        for output, scratch in beside.items():
+            self.line(copied_bytes(self.pointer(output), scratch, self.registers[output] * self.size))
 
     def call(self, name: str, pointers: Sequence[str], *integers: int) -> None:
         """Call a function of these addresses, and of integers."""

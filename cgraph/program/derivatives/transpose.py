@@ -19,7 +19,7 @@ from ...simplification.simplify import simplify
 from ...util.caches import kept_by_first
 from ...util.require import require_mapping, require_whole
 from ..program import Program
-from ..runners.choose_runner import runner
+from ..runners.native_runner import runner
 from ..runners.runner import Runner
 from ..statement import Lengths, Statement, effects, length_of, needed, reads_and_writes, row_of
 from ..statements.call import Call, added, copied

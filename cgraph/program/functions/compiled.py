@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-import warnings
+import pickle
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from pathlib import Path
@@ -31,11 +31,9 @@ from ..program import Program
 from ..runners.native_runner import NativeRunner
 from ..runners.python_runner import PythonRunner
 from ..statements.call import Call
-from .bound_function import BoundFunction
-from .derivative import Chosen, ColoredMatrix, Derivatives, Ready
+from .derivative import BoundFunction, Chosen, ColoredMatrix, Derivatives, Ready
 
 BACKENDS = ("auto", "python", "numpy", "llvm")
-LARGE_GRAPH = 1_000_000  # nodes; beyond, making machine code takes longer than most callers gain
 Inputs = str | Node | Sequence[str | Node] | None
 
 
@@ -44,12 +42,8 @@ class Compiled(BoundFunction):
 
     Attributes
     ----------
-    graph : Graph
-        What was compiled.
-    backend : str
-        The back end that was asked for.
-    options : dict
-        The keyword arguments of `compile`.
+    graph, backend, options
+        What was compiled, the back end that was asked for, and the keyword arguments of `compile`, a dict.
     n_in, n_out : int
         Numbers of inputs and outputs.
     source : str
@@ -73,18 +67,16 @@ class Compiled(BoundFunction):
         self.source = self._runner.text("x")
         super().__init__(self._bound, self.n_in, (self.n_out,), graph.input_names)
         self._derivatives = Derivatives(graph, ready, self._runner)
-        if isinstance(self._runner, PythonRunner) and (on_lists := self._runner.on_lists("x")) is not None:
-            self.values = on_lists  # type: ignore[method-assign]  # without arrays on the way
+        if isinstance(self._runner, PythonRunner) and backend != "numpy":
+            self.values = self._runner.on_floats(graph)  # type: ignore[method-assign]  # without arrays on the way
 
     def batch(self, X: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
         """Values of the outputs, (n_out, N), at N points X, (n_in, N).
 
         The last axis counts the points here, so that the numbers of one input lie side by side in the lanes of vectors;
-        derivatives and motions have it first. Machine code reads and writes points that lie one after another, such as
-        `rows.T` of rows (N, n_in), as they lie: `.T` of the result then is rows, too.
+        derivatives and motions have it first. Machine code takes `rows.T` of rows (N, n_in) as it lies.
         out: where they go, an array of float64 (n_out, N) that shares no memory with X; a new one by default.
-        threads: how many may share the work; None: one for each core. A batch too small to gain by it takes fewer, and
-        generated Python (backend "python") takes one. They change nothing in the values.
+        threads: how many may share the work, which changes no value; None: one for each core. Few points take fewer.
         Raises GraphError for another shape or an `out` that is none, ValueError for less than one thread.
         """
         count = thread_count(threads)
@@ -92,8 +84,7 @@ class Compiled(BoundFunction):
         if points.ndim != 2 or points.shape[0] != self.n_in:
             raise GraphError(f"X must have shape ({self.n_in}, N), one row for each input, got {points.shape}")
         total = points.shape[1]
-        order = "F" if self._runner.takes_rows and lies_in_rows(points) else "C"
-        result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
+        result = np.empty((self.n_out, total), order="F" if lies_in_rows(points) else "C") if out is None else out
         if out is not None:
             require_out(out, (self.n_out, total), points)
         write_batch(*self._runner.columns("x"), points, result, count)
@@ -102,10 +93,8 @@ class Compiled(BoundFunction):
     def bind(self, x: Array, y: Array) -> Callable[[], None]:
         """A function of nothing that reads x, (n_in,), and writes y, (n_out,): the fastest call there is.
 
-        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it,
-        and Python's other threads wait meanwhile.
-        Raises GraphError unless both are contiguous arrays of float64 in these shapes, y can be written and they
-        share no memory.
+        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it.
+        Raises GraphError unless both are contiguous float64 in these shapes, y can be written and they share no memory.
         """
         require_memory("x", x, (self.n_in,))
         require_memory("y", y, (self.n_out,))
@@ -116,15 +105,12 @@ class Compiled(BoundFunction):
     def address(self) -> int:
         """Address of the machine code as a function of C, `void (const double *x, double *y)`, for cffi, Numba, ctypes.
 
-        x has the n_in inputs, y the n_out outputs, and they do not overlap; any number of threads may call it. It is
-        there as long as this compiled graph is: keep `fn` alive while the address is used.
-        Raises RuntimeError for generated Python, which has none.
+        x has the n_in inputs, y the n_out outputs, and they do not overlap; any number of threads may call it, as long
+        as `fn` is alive. Raises RuntimeError for generated Python, which has none.
 
         >>> import ctypes
-        >>> x = cg.variable("x")
-        >>> fn = cg.compile(cg.Graph([x], {"y": x + 1.0}))
-        >>> numbers = ctypes.POINTER(ctypes.c_double)
-        >>> y = ctypes.c_double()
+        >>> x, y = cg.variable("x"), ctypes.c_double()
+        >>> fn, numbers = cg.compile(cg.Graph([x], {"y": x + 1.0})), ctypes.POINTER(ctypes.c_double)
         >>> ctypes.CFUNCTYPE(None, numbers, numbers)(fn.address)(ctypes.c_double(2.0), y)
         >>> y.value
         3.0
@@ -133,19 +119,16 @@ class Compiled(BoundFunction):
 
     @cached_property
     def _c_entry(self) -> CEntry:
-        """The machine code as functions of C; made at the first use."""
+        """The machine code as functions of C."""
         if not isinstance(self._runner, NativeRunner):
-            raise RuntimeError(
-                f"an address needs machine code, and this is generated Python, backend {self.backend!r}: "
-                "cg.compile(graph, 'llvm') says what is missing"
-            )
-        return c_entry(self._runner.point("x", "y").entry, self.n_in, self.n_out)
+            problem = f"an address needs machine code, and this is generated Python, backend {self.backend!r}"
+            raise RuntimeError(f"{problem}: cg.compile(graph, 'llvm') says what is missing")
+        return c_entry(self._runner.point("x", "y")[1], self.n_in, self.n_out)
 
     def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
 
-        An entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor
-        that is infinite or NaN it is NaN.
+        An entry of x_dot that is zero counts for nothing, also where an operation has no slope in it.
 
         Parameters
         ----------
@@ -210,11 +193,9 @@ class Compiled(BoundFunction):
         Parameters
         ----------
         x : array_like, (n_in,) or (N, n_in)
-            The point, or points, a row each, which lie side by side in vectors. Of points in columns, as `batch` takes
-            them, it is `jacobian(X.T)`.
+            The point, or points, a row each; of points in columns, as `batch` takes them, it is `jacobian(X.T)`.
         wrt : optional
-            The inputs to differentiate by, n_in of them, in this order; by default all. With displacements as inputs,
-            a quaternion q + G(q) xi, the columns of these at xi = 0 are those of displacements.
+            The inputs to differentiate by, n_in of them, in this order; by default all.
         sparse : bool
             Give a scipy.sparse.csr_array with the entries of `cg.sparsity`; of N points a list of them.
         threads : int, optional
@@ -289,8 +270,7 @@ class Compiled(BoundFunction):
     ) -> Callable[[], None]:
         """A function of nothing that reads x and writes the Jacobian: the fastest way to it.
 
-        As for `bind`, the arrays are checked here and kept alive, and one thread at a time may call it. What is zero
-        whatever x is set to zero here, and not touched by the function.
+        As for `bind`, the arrays are checked here and kept alive. What is always zero is set here, and not again.
 
         Parameters
         ----------
@@ -303,8 +283,7 @@ class Compiled(BoundFunction):
         Raises
         ------
         GraphError
-            For arrays that are not contiguous float64 of these shapes, or share memory, and for an input that is not
-            there.
+            For arrays that are not contiguous float64 of these shapes, or share memory, or an unknown input.
 
         Examples
         --------
@@ -322,12 +301,8 @@ class Compiled(BoundFunction):
         values[...] = 0.0
         return bound(partial(matrix.write, x, values, count) if rows else matrix.bind(x, values))
 
-    def batch_source(self) -> str:
-        """The text of the function for batches: NumPy or LLVM."""
-        return self._runner.text("x", side_by_side=True)
-
     def _points(self, x: ArrayLike) -> Array:
-        """The point, (n_in,), or points, (N, n_in), checked."""
+        """The point, (n_in,), or points, (N, n_in)."""
         points = real_array("x", x)
         if points.shape != (self.n_in,) and (points.ndim != 2 or points.shape[1] != self.n_in):
             wanted = f"({self.n_in},), one value for each input, or (N, {self.n_in}), a point a row"
@@ -349,23 +324,22 @@ class Compiled(BoundFunction):
         width, found = self.n_in if chosen is None else len(chosen), self.n_out
         if reverse:
             width, found = found, width
-        count, one, total = thread_count(threads), points.ndim == 1, len(points)
-        if not one and rows.ndim == 1:
-            rows = np.broadcast_to(rows, (total, *rows.shape))
-        if rows.ndim - points.ndim not in (0, 1) or rows.shape[-1] != width or not (one or len(rows) == total):
+        count, leading = thread_count(threads), points.shape[:-1]
+        if leading and rows.ndim == 1:
+            rows = np.broadcast_to(rows, (*leading, *rows.shape))
+        fits = rows.ndim - points.ndim in (0, 1) and rows.shape[-1] == width
+        if not fits or (leading and len(rows) != len(points)):
+            total = len(points)
             each = f"({total}, {width}), ({total}, k, {width}) or ({width},) for {total} points"
-            raise GraphError(
-                f"{name} must have shape {f'(k, {width}) or ({width},)' if one else each}, got {rows.shape}"
-            )
+            wanted = each if leading else f"(k, {width}) or ({width},)"
+            raise GraphError(f"{name} must have shape {wanted}, got {rows.shape}")
         result = np.zeros((*rows.shape[:-1], found))
         if self.n_in and result.size:
             products = self._derivatives.products(chosen, reverse)
-            if not one:
-                products.many(points, rows.reshape(total, -1, width), result.reshape(total, -1, found), count)
-            elif rows.ndim == 2:
-                products.at(points, rows, result)
+            if rows.ndim == points.ndim:  # a direction for each point
+                products.write(points, rows[..., None, :], result[..., None, :], count)
             else:
-                products.at(points, rows[None], result[None])
+                products.write(points, rows, result, count)
         return result
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
@@ -374,15 +348,15 @@ class Compiled(BoundFunction):
             return matrix.at(points, True, count)
         module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
         rows = matrix.at(points, False, count)
-        shape, listed = matrix.entries.shape, rows if rows.ndim == 2 else [rows]
-        found = [module.csr_array((row, columns.copy(), starts.copy()), shape=shape) for row in listed]
+        listed = rows if rows.ndim == 2 else [rows]
+        found = [module.csr_array((row, columns.copy(), starts.copy()), shape=matrix.entries.shape) for row in listed]
         return found if rows.ndim == 2 else found[0]
 
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
         return self._runner.bind_pass(("x", x), ("y", y))[0]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _remade, (_Version(), self.graph, self.backend, self.options)  # which make the machine code again
+        return _unpickled, (__version__, pickle.dumps((self.graph, self.backend, self.options)))
 
     def _repr_html_(self) -> str:
         rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]
@@ -403,8 +377,7 @@ def compile(
 ) -> Compiled:
     """The graph as a function: `fn(x)` at one point, `fn.batch(X)` at many, `fn.source` to read.
 
-    All back ends agree with `graph.evaluate`, on floats and on arrays respectively. `fast` and `cache` are for machine
-    code alone.
+    All back ends agree with `graph.evaluate`, on floats and on arrays respectively.
 
     Parameters
     ----------
@@ -412,24 +385,18 @@ def compile(
         What to compile.
     backend : {"auto", "llvm", "python", "numpy"}
         "llvm": machine code (extra `native`). "python": generated Python over floats. "numpy": generated NumPy over
-        arrays. "auto": machine code where llvmlite is installed, the C library has all functions of the graph and that
-        has at most 1 000 000 nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`; a
-        RuntimeWarning says so if it is the size. Beyond 60 000 nodes machine code is made in two thirds of the time
-        for a node, and takes twice as long to run.
+        arrays. "auto": machine code where llvmlite is installed and the C library has all functions of the graph, else
+        generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`.
     fast : bool
-        May also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero; NaN and
-        infinities keep their meaning.
+        Machine code may also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero.
     fma : bool
         May round a product and the sum it goes into once instead of twice, and take sines, cosines, exponentials and
         logarithms from polynomials (within 2 ulp), NumPy its own functions. Without, `fn(x)` and `fn.batch(X)` agree
-        with `graph.evaluate` at a point to the last bit, in every back end; batches then call the C library for each
-        column.
+        with `graph.evaluate` at a point to the last bit, in every back end.
     cache : bool or path
         Keep machine code on disk for the next process, and read it from there: True, in the platform's folder for
         caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder, `~` the home, that nobody
-        else can write to. An entry is identified by the code's text, the processor and the version of LLVM; a damaged
-        one is made anew. A folder that cannot be written gives a RuntimeWarning. `clear_cache` empties it; nothing
-        else does.
+        else can write to; if this user cannot, there is a RuntimeWarning. `clear_cache` empties it.
 
     Returns
     -------
@@ -457,53 +424,29 @@ def compile(
     """
     require_choice("backend", backend, BACKENDS)
     require_graph("compile", graph)
-    options: dict[str, Any] = {
-        "fast": require_flag("fast", fast),
-        "fma": require_flag("fma", fma),
-        "cache": _place(cache),
-    }
-    large = backend == "auto" and len(graph.nodes) > LARGE_GRAPH
-    if large:
-        warnings.warn(
-            f"a graph of {len(graph.nodes)} nodes is compiled to generated Python, as it has more than {LARGE_GRAPH}; "
-            "backend='llvm' makes machine code of it",
-            RuntimeWarning,
-            stacklevel=2,
-        )
-    if backend == "llvm" or (backend == "auto" and not large):
+    fast, fma = require_flag("fast", fast), require_flag("fma", fma)
+    if isinstance(cache, (bool, np.bool_)):
+        kept: bool | str = bool(cache)
+    elif isinstance(cache, (str, os.PathLike)) and os.fspath(cache):
+        kept = str(Path(cache).expanduser().absolute())  # holds in another folder and another process
+    else:
+        raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r:.60}")
+    options = {"fast": fast, "fma": fma, "cache": kept}
+    if backend in ("auto", "llvm"):
         try:
-            kept = open_cache(options["cache"])
-            ready = partial(NativeRunner, fast=options["fast"], fma=options["fma"], cache=kept)
+            ready = partial(NativeRunner, fast=fast, fma=fma, cache=open_cache(kept))
             return Compiled(graph, backend, options, ready, ready)
         except (ImportError, MissingFunctionError):
             if backend == "llvm":
                 raise
-    in_python = partial(PythonRunner, fma=options["fma"])
+    in_python = partial(PythonRunner, fma=fma)
     return Compiled(graph, backend, options, in_python, partial(in_python, backend=backend))
 
 
-def _place(cache: bool | str | os.PathLike[str]) -> bool | str:
-    """The choice of a cache in words that hold in another folder and another process."""
-    if isinstance(cache, (bool, np.bool_)):
-        return bool(cache)
-    if not isinstance(cache, (str, os.PathLike)) or not os.fspath(cache):
-        raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r:.60}")
-    return str(Path(cache).expanduser().absolute())
-
-
-class _Version:
-    """The version that writes a pickle; in it, the first that is read."""
-
-    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
-        return require_version, (__version__,)
-
-
-def require_version(version: str) -> None:
-    """Raise ValueError unless a pickle was written by this version."""
+def _unpickled(version: str, parts: bytes) -> Compiled:
+    """The function of a pickle, its machine code made again; raises ValueError unless this version wrote it."""
     if version != __version__:
         problem = f"was pickled by cgraph {version}, and this is cgraph {__version__}"
         raise ValueError(f"a compiled graph {problem}: pickle the graph alone, or compile it again")
-
-
-def _remade(_: object, graph: Graph, backend: str, options: dict[str, Any]) -> Compiled:
+    graph, backend, options = pickle.loads(parts)  # noqa: S301 (a part of what pickle reads already)
     return compile(graph, backend, **options)

@@ -1,35 +1,41 @@
-"""A program as machine code, for one memory or a vector of them."""
+"""`runner`: a program as machine code, for one memory or a vector of them, or in Python where there is none."""
 
 from __future__ import annotations
 
 import ctypes
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...codegen import llvm_engine as llvm
 from ...codegen.arithmetic import Arithmetic
 from ...codegen.bound_call import LONG, SHORT, bound_call
-from ...codegen.llvm_ir import point_arithmetic
+from ...codegen.function_writer import copied_bytes
+from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
 from ...core.evaluation import Array
 from ...core.scope import without_collection
 from ...util.caches import made_once
+from ...util.explain_failure import explain_failure
 from ...util.memory import aligned
+from ...util.require import require_choice, require_flag
 from ..fuse import fused
 from ..program import Program, outliving, whole_graph
 from ..statement import row_of
-from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts
-from .runner import Record, Runner, Start
+from ..statements.call import Call
+from ..writer import Functions, Writer
+from .runner import Record, Runner, Start, offsets
 
 if TYPE_CHECKING:
     from ...codegen.batch_ir import Batch
     from ...codegen.disk_cache import Cache
-    from .batch_code import LaneCode
+    from .batch_code import BatchCode, LaneCode
 
+BACKENDS = ("auto", "python", "llvm")
 _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
 WORK = 2**23  # nodes times points in a block of a batch: some tenths of a millisecond, several times a thread's start
@@ -38,31 +44,23 @@ _RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _P
 _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no NaN and no infinity
 
 
-class PointCode(NamedTuple):
-    """One pass of which two registers lie apart: the text, the function, and where the other registers lie."""
-
-    source: str
-    entry: Any
-    places: dict[str, int]
-
-
 class NativeRunner(Runner):
-    """A program as machine code. Any number of threads may run it at once, on a memory each.
+    """A program as machine code. Any number of threads may run it at once, on a memory each."""
 
-    fast, fma: liberties of the arithmetic, as in `cg.compile`.
-    """
-
-    takes_rows, vectors = True, 17
+    vectors = 17
 
     def __init__(self, program: Program, *, fast: bool = False, fma: bool = True, cache: Cache | None = None) -> None:
         host = llvm.host()
         super().__init__(program, host.lanes)
         self.lanes = host.lanes
-        require_texts(program)
+        for statement in program.statements():
+            if row_of(statement).text is None:
+                raise llvm.MissingFunctionError(f"statement {type(statement).__name__} has no text for LLVM")
         self._flags, self._host, self._cache = _FAST if fast else "contract" if fma else "", host, cache
         self._fused = fused(program)
         self._nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
-        self._functions = program_functions(self._fused)
+        calls = [call for graph in self._fused.graphs() for call in libm_functions(graph).items()]
+        self._functions = dict(sorted(calls))
         host.require(self._functions)
 
     def _compiled(self, text: str, lanes: int = 1, *, looped: bool = False) -> llvm.Code:
@@ -78,12 +76,11 @@ class NativeRunner(Runner):
     @cached_property
     def masked(self) -> Program:
         """The program of memories side by side, see `many`."""
-        program: Program = self._side.masked_program(self.program)
+        program: Program = self._side.many_keeping(self.program, self.program.registers)
         return program
 
     @cached_property
     def _fused_many(self) -> Program:
-        """The program of a vector of memories."""
         return self._fused if self.masked is self.program else fused(self.masked)
 
     @made_once
@@ -137,53 +134,134 @@ class NativeRunner(Runner):
 
     def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         """The arrays' addresses go into the call."""
-        code = self.point(x[0], y[0])
-        memory = aligned(code.places[""])
+        _, entry, places = self.point(x[0], y[0])
+        memory, lengths = aligned(places[""]), self.program.registers
         memory[:] = 0.0
-        lengths = self.program.registers
-        registers = {name: memory[at : at + lengths[name]] for name, at in code.places.items() if name}
-        return bound_call(code.entry, x[1], y[1], memory), registers
+        registers = {name: memory[at : at + lengths[name]] for name, at in places.items() if name}
+        return bound_call(entry, x[1], y[1], memory), registers
 
     @made_once
-    def point(self, x: str, y: str) -> PointCode:
-        """Machine code of one pass of which two registers lie apart."""
+    def point(self, x: str, y: str) -> tuple[str, Any, dict[str, int]]:
+        """Machine code of one pass of which two registers lie apart: text, function, places of other registers."""
         with without_collection():
             text, places = point_ir(self._fused, x, y, self._flags, self.width, self._host.registers)
-        entry = self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG)
-        return PointCode(text, entry, places)
+        return text, self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG), places
 
     @made_once
-    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
+    def columns(self, name: str, start: Start = dict) -> tuple[int, BatchCode]:
         """The points in a block, and the machine code."""
-        lanes, text, alone = self._host.lanes, self._pass(name), whole_graph(self._fused, name) is not None
-        code, values = self._compiled(text.source, lanes, looped=not alone), start()
-        places = offsets(self._fused_many.registers, 1) if values else {}
-        begin = {places[other]: numbers for other, numbers in values.items()}
-        width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
-        return width, self._side.BatchCode(code, lanes, text.size, begin, columns=alone)
+        arithmetic, alone = Arithmetic(self._flags, self.lanes, self._host.registers), whole_graph(self._fused, name)
+        with without_collection():
+            text: Batch = self._side.pass_ir(self._fused, name, arithmetic, program_ir)
+        code, places = self._compiled(text.source, self.lanes, looped=alone is None), offsets(self._fused.registers, 1)
+        begin = {places[other]: numbers for other, numbers in start().items()}
+        width = max(WORK // max(1, self._nodes) // self.lanes, 1) * self.lanes
+        return width, self._side.BatchCode(code, self.lanes, text, begin, columns=alone is not None)
 
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Registers that outlive a pass, or are results, are in a memory; the others in the code's own."""
         if self.program.feed or any(row_of(each).beside is None for each in self.program.statements()):
             return None
-        lanes, lengths = self._host.lanes, self.program.registers
-        arithmetic = Arithmetic(self._flags, lanes, self._host.registers, alike=alike)
-        first = {*outliving(self._fused), *results}
+        arithmetic = Arithmetic(self._flags, self.lanes, self._host.registers, alike=alike)
+        lengths, first = self.program.registers, {*outliving(self._fused), *results}
         kept = [name for name in lengths if name in first]
-        ordered = {name: lengths[name] for name in dict.fromkeys([*kept, *lengths])}
+        program = replace(self._fused, registers={name: lengths[name] for name in dict.fromkeys([*kept, *lengths])})
         with without_collection():
-            masked = self._side.lane_program(replace(self._fused, registers=ordered), kept, alike)
-            text = self._side.lane_ir(masked, sum([lengths[name] for name in kept]), clock, arithmetic)
-        code: LaneCode = self._side.LaneCode(self._compiled(text.source, lanes), masked, kept, lanes, text.size)
+            code: LaneCode = self._side.LaneCode(program, kept, clock, arithmetic, program_ir, self._compiled)
         return code
 
-    def text(self, x: str, *, side_by_side: bool = False) -> str:
+    def text(self, x: str) -> str:
         """The text in LLVM's language."""
-        return self._pass(x).source if side_by_side else self.point(x, self.program.record[0]).source
+        return self.point(x, self.program.record[0])[0]
 
-    def _pass(self, name: str) -> Batch:
-        """The module of one pass at many values of a register."""
-        how = self._host.lanes, self._flags, self._host.registers
-        with without_collection():
-            text: Batch = self._side.pass_ir(self._fused, lambda: self._fused_many, name, *how)
-        return text
+
+def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:
+    """A module with `run`, which gives the number of rows of `records` and writes that of passes to `done`.
+
+    int64_t run(
+        double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed, int64_t stride
+    )
+
+    stride: numbers from a row of the feed to the next.  width: of the vectors in which `Map` goes through its elements.
+    """
+    functions = Functions(arithmetic, width)
+    ir, places = Writer(program.registers, functions), offsets(program.registers, width)
+    ir.offsets = places
+    ir.pointers = {name: ir.at("%memory", places[name]) for name in program.registers}
+    calls = Counter([id(each.graph) for each in program.statements() if isinstance(each, Call)])
+    ir.alone = frozenset([graph for graph, count in calls.items() if count == 1])
+    row = ir.room(1, "ptr")
+    ir.store_at("%records", row, "ptr")
+    ir.store_at(0, "%done", "i64")
+    with ir.repeat() as end:
+        before = ir.load_at("%done", "i64")
+        ir.leave_unless(ir.integer("icmp slt", before, "%passes"), end)
+        _moved(ir, program.feed, ir.at("%feed", ir.integer("mul", before, "%stride")), reading=True)
+        ir.run(program.body)
+        done = ir.integer("add", before, 1)
+        ir.store_at(done, "%done", "i64")
+        due = ir.integer("icmp eq", ir.integer("urem", done, "%every"), 0)
+        with ir.when(due), ir.when("true" if program.record_if is None else ir.positive(program.record_if)):
+            ir.store_at(_moved(ir, program.record, ir.load_at(row, "ptr"), reading=False), row, "ptr")
+        if program.stop is not None:  # NaN counts as not 0
+            ir.leave_unless(ir.compare("oeq", ir.load(program.stop), 0.0), end)
+    first, last = [ir.value(f"ptrtoint ptr {each} to i64") for each in ("%records", ir.load_at(row, "ptr"))]
+    rows = ir.integer("sdiv", ir.integer("sub", last, first), max(1, program.width) * ir.size)
+    counts = "i64 %passes, i64 %every, ptr %done, ptr noalias %feed, i64 %stride"
+    run = ir.function(f"i64 @run(ptr noalias %memory, ptr noalias %records, {counts}) nounwind", f"i64 {rows}")
+    return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
+
+
+def point_ir(program: Program, x: str, y: str, flags: str, width: int, registers: int) -> tuple[str, dict[str, int]]:
+    """A module with `void point(double *x, double *y, double *memory)`, one pass, and the places of registers there."""
+    if (graph := whole_graph(program, x)) is not None:
+        return scalar_ir(graph, flags, registers), {"": 0}
+    functions = Functions(point_arithmetic(flags, registers), width)
+    ir = Writer(program.registers, functions)
+    # Single numbers last: others then begin where vectors may.
+    lengths = sorted(program.registers.items(), key=lambda item: item[1] < 2)
+    inner = {name: length for name, length in lengths if name not in (x, y)}
+    places = offsets(inner, width)
+    ir.pointers = {x: "%x", y: "%y", **{name: ir.at("%memory", places[name]) for name in inner}}
+    ir.run(program.body)
+    point = ir.function("void @point(ptr noalias %x, ptr noalias %y, ptr noalias %memory) nounwind")
+    return "\n".join([*preamble(program.graphs(), functions.arithmetic), *functions.definitions, *point, ""]), places
+
+
+def _moved(ir: Writer, names: Sequence[str], row: str, *, reading: bool) -> str:
+    """Registers from a row, where they lie end to end, or to it; the address behind it."""
+    for name in names:
+        length, register = ir.registers[name], ir.pointer(name)
+        target, source = (register, row) if reading else (row, register)
+        ir.line(copied_bytes(target, source, length * ir.size))
+        row = ir.at(row, length)
+    return row
+
+
+@explain_failure
+def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: bool = True) -> Runner:
+    """A program made ready to run.
+
+    backend: "llvm" is machine code (extra `native`), "python" Python over lists; "auto" takes machine code where
+    llvmlite is installed.  fast, fma: liberties with rounding, as in `cg.compile`.
+    Raises ValueError for an unknown backend, ImportError for "llvm" without llvmlite.
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Program, runner
+    >>> x = cg.variable("x")
+    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
+    >>> run.run(run.memory({"x": 8.0}), passes=3).rows.ravel().tolist()
+    [4.0, 2.0, 1.0]
+    """
+    require_choice("backend", backend, BACKENDS)
+    fast, fma = require_flag("fast", fast), require_flag("fma", fma)
+    if backend != "python":
+        try:
+            return NativeRunner(program, fast=fast, fma=fma)
+        except (ImportError, llvm.MissingFunctionError):
+            if backend == "llvm":
+                raise
+    from .python_runner import PythonRunner
+
+    return PythonRunner(program, fma=fma)

@@ -28,7 +28,7 @@ STATES = 512  # states of a batch that are run between looks at the keyboard
 class PythonRunner(Runner):
     """A program in Python over lists, and many at once over arrays.
 
-    fma: if not, NumPy has its functions from the C library, too, one element after another.
+    fma: if not, NumPy has its functions from the C library, too.
     backend: of a program of one call, "python" for lists alone, "numpy" for arrays alone.
     """
 
@@ -37,6 +37,7 @@ class PythonRunner(Runner):
     def __init__(self, program: Program, *, fma: bool = True, backend: str = "auto") -> None:
         super().__init__(program)
         self._fma, self._backend = fma, backend
+        self._execution = Execution(program.registers, self._at, self._batch)
         self._functions: dict[int, OnFloats] = {}
         self._arrays: dict[int, OnArrays] = {}
 
@@ -46,8 +47,7 @@ class PythonRunner(Runner):
         return many(self.program)
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
-        program = self.program
-        execution = Execution(program.registers, self._at, self._batch)
+        program, execution = self.program, self._execution
         state = {name: memory[place].tolist() for name, place in self._slices.items()}
         rows: list[list[float]] = []
         done = 0
@@ -78,14 +78,12 @@ class PythonRunner(Runner):
         return Record(rows, passes)
 
     def _bind(self, memory: Array, rows: Array | None) -> Callable[..., None]:
-        def write(into: Array) -> None:
-            found = self._run(memory, len(into), 1, np.empty((len(into), 0))).rows
-            into[: len(found)] = found
+        def run(passes: int = 0 if rows is None else len(rows)) -> None:
+            found = self._run(memory, passes, passes + 1 if rows is None else 1, np.empty((passes, 0))).rows
+            if rows is not None:
+                rows[: len(found)] = found
 
-        def advance(passes: int) -> None:
-            self._run(memory, passes, passes + 1, np.empty((passes, 0)))
-
-        return advance if rows is None else lambda: write(rows)
+        return run
 
     def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         """Registers are lists in between."""
@@ -95,17 +93,17 @@ class PythonRunner(Runner):
             if self._backend == "numpy":
                 columns = self._on_arrays(graph), point[:, None], flat[:, None]
                 return lambda: columns[0](*columns[1:]), arrays
-            function = self._on_floats(graph)
+            function = self.on_floats(graph)
 
             def call() -> None:
                 flat[:] = function(point.tolist())
 
             return call, arrays
-        arrays[y[0]], execution = flat, Execution(self.program.registers, self._at, self._batch)
+        arrays[y[0]] = flat
 
         def run() -> None:
             state: dict[str, Any] = {**arrays, x[0]: point.tolist()}
-            execution.run(self.program.body, state)
+            self._execution.run(self.program.body, state)
             for name, array in arrays.items():
                 if state[name] is not array:
                     array[:] = state[name]
@@ -126,7 +124,7 @@ class PythonRunner(Runner):
             return STATES, write
         if self._backend != "python":
             return BLOCK, self._on_arrays(graph)
-        function = self._on_floats(graph)
+        function = self.on_floats(graph)
 
         def one_by_one(points: Array, result: Array) -> None:
             for column, x in enumerate(points.T.tolist()):
@@ -138,29 +136,21 @@ class PythonRunner(Runner):
         """None: it is machine code."""
         return None
 
-    def text(self, x: str, *, side_by_side: bool = False) -> str:
+    def text(self, x: str) -> str:
         """The text of one graph in Python, or in NumPy; of other programs their listing."""
-        if (graph := whole_graph(self.program, x)) is None:
-            return self.program.listing()
-        return (self._on_arrays if side_by_side or self._backend == "numpy" else self._on_floats)(graph).source
+        graph, of = whole_graph(self.program, x), self._on_arrays if self._backend == "numpy" else self.on_floats
+        return self.program.listing() if graph is None else of(graph).source
 
-    def on_lists(self, x: str) -> OnFloats | None:
-        """The function of lists, of one graph."""
-        graph = whole_graph(self.program, x)
-        return None if self._backend == "numpy" or graph is None else self._on_floats(graph)
-
-    def _on_floats(self, graph: Graph) -> OnFloats:
-        if id(graph) not in self._functions:
-            self._functions[id(graph)] = OnFloats(graph)
-        return self._functions[id(graph)]
+    def on_floats(self, graph: Graph) -> OnFloats:
+        """The graph as a function of a list."""
+        return self._functions.get(id(graph)) or self._functions.setdefault(id(graph), OnFloats(graph))
 
     def _on_arrays(self, graph: Graph) -> OnArrays:
-        if id(graph) not in self._arrays:
-            self._arrays[id(graph)] = OnArrays(graph, exact=not self._fma)
-        return self._arrays[id(graph)]
+        exact = not self._fma
+        return self._arrays.get(id(graph)) or self._arrays.setdefault(id(graph), OnArrays(graph, exact=exact))
 
     def _at(self, graph: Graph, x: Sequence[float]) -> Sequence[float]:
-        return self._on_floats(graph)(x)
+        return self.on_floats(graph)(x)
 
     def _batch(self, graph: Graph, points: Array) -> Array:
         result, function = np.empty((len(graph.outputs), points.shape[1])), self._on_arrays(graph)

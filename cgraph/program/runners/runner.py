@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,11 +11,9 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
-from ...util.memory import describe, require_memory, require_out
+from ...util.memory import require_memory
 from ...util.require import require_mapping, require_whole
-from ...util.threads import thread_count, write_batch
-from ..program import Program, outliving
-from .llvm_ir import offsets
+from ..program import Program
 
 if TYPE_CHECKING:
     from .batch_code import LaneCode
@@ -24,20 +21,18 @@ if TYPE_CHECKING:
 Start = Callable[[], Mapping[str, Array]]  # gives initial values of registers
 
 
+def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
+    """Place of each register in the memory, its length padded to whole vectors; under "" the size of it all."""
+    at, places = 0, {}
+    for name, length in registers.items():
+        places[name] = at
+        at += length if length < 2 else -(-length // width) * width
+    places[""] = at
+    return places
+
+
 class Record(NamedTuple):
-    """The rows of a run, one for each pass that recorded, and how many passes were run.
-
-    rows: (rows, width), or (rows, width, N) of N runs at once.
-
-    >>> import cgraph as cg
-    >>> from cgraph.extend import Call, Program, runner
-    >>> x = cg.variable("x")
-    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
-    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
-    >>> run.run(run.memory({"x": 8.0}), passes=4, every=2)
-    Record(rows=array([[2. ],
-           [0.5]]), passes=4)
-    """
+    """The rows of a run, (rows, width), or (rows, width, N) of N runs at once, and how many passes were run."""
 
     rows: Array
     passes: int
@@ -57,7 +52,6 @@ class Runner(ABC):
     # Directions in a vector, and vectors in a block: odd, since rows a power of two apart would share few cache lines.
     lanes, vectors = 8, 513
     vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
-    takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
 
     def __init__(self, program: Program, width: int = 1) -> None:
         self.program, self.width = program, width
@@ -102,33 +96,30 @@ class Runner(ABC):
         """Run passes, fewer if the program stops, and record a row after each `every`th.
 
         memory: float64 (size,), changed in place: the next run continues from it. Or N memories (size, N), which run
-        side by side in vectors, as each does alone, whichever course it takes; the last axis counts them, as in
-        `Compiled.batch`, and rows of the record are (rows, width, N).
-        feed: (passes, feed_width), of a program with a feed, what its registers are before each pass; of N memories
+        side by side in vectors, each as it does alone; rows of the record are then (rows, width, N).
+        feed: (passes, feed_width), what the registers of the program's feed are before each pass; of N memories
         (passes, feed_width, N), or (passes, feed_width, 1) for all.
         Raises GraphError for a memory or a feed of another shape or type, or a number out of range; for N memories of a
-        program with `record_if` or `stop`, by which they would have other numbers of rows or passes, or with statements
-        that run one memory alone.
+        program with `record_if` or `stop`, or with statements that run one memory alone.
         """
         many = memory.shape[1:] if isinstance(memory, np.ndarray) and memory.ndim == 2 else ()
-        self._check(memory, (self.size, *many), passes, every)
-        if many:
-            self._require_beside()
+        require_memory("a memory", memory, (self.size, *many))
+        require_whole("passes", passes)
+        require_whole("every", every, 1)
+        if many and (alone := self.program.alone):
+            raise GraphError(f"programs with {', '.join(alone)} run one memory at a time, not side by side")
         shape = (passes, self.program.feed_width, *many)
-        fed = np.empty(shape) if feed is None and not self.program.feed else self._fed(feed, shape)
-        try:
-            return (self._run_many if many else self._run)(memory, passes, every, fed)
-        except MemoryError:
-            rows = f"{passes // every} rows of {self.program.width * math.prod(many)} numbers"
-            raise MemoryError(f"{rows} do not fit in memory: record fewer passes (every)") from None
+        fed = np.empty(() if self.program.feed else shape) if feed is None else real_array("feed", feed)
+        if fed.shape not in (shape, (*shape[:2], 1)[: len(shape)]):
+            raise GraphError(f"the program needs a feed of shape {shape}, got {fed.shape}")
+        return (self._run_many if many else self._run)(memory, passes, every, fed)
 
     def bind(self, memory: Array, rows: Array | None = None) -> Callable[..., None]:
         """A function of nothing: `run` on this memory, len(rows) passes, which writes the rows.
 
         Without rows a function of a number of passes, which records nothing. The arrays, float64 (size,) and
-        (passes, width), are checked here and never again; the function keeps them alive. Registers may be written
-        between calls, such as through `read`. A pass that records nothing leaves the last rows as they were. One thread
-        at a time may call it.
+        (passes, width), are checked here and never again; the function keeps them alive. One thread at a time may call
+        it; between calls registers may be written. A pass that records nothing leaves the last rows as they were.
         Raises GraphError for an array of another shape or type, or a program with a feed.
         """
         if self.program.feed:
@@ -136,78 +127,20 @@ class Runner(ABC):
         if rows is not None:
             passes = len(rows) if isinstance(rows, np.ndarray) and rows.ndim else 0
             require_memory("rows", rows, (passes, self.program.width))
-        self._check(memory, (self.size,), 0, 1)
+        require_memory("a memory", memory, (self.size,))
         return self._bind(memory, rows)
 
-    run_many, advancing = run, bind  # of N memories, and without rows
-
     @abstractmethod
-    def text(self, x: str, *, side_by_side: bool = False) -> str:
-        """What one pass from this register to the record is run as; with `side_by_side` at many values of it."""
-
-    def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
-        """Record of one pass, (N, width), at each of N values of a register, (N, length), side by side in vectors.
-
-        threads: how many may share the work; None: one for each core.  out: where the rows go, sharing no memory with
-        `values`; a new array by default.
-        Raises GraphError for another shape; if the program cannot `run` N memories, or has a feed; if a pass reads or
-        records a register, other than this one, that it may not have set before.
-        """
-        count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
-        length = len(self.read(np.empty(self.size), name))
-        if rows.ndim != 2 or rows.shape[1] != length:
-            raise GraphError(f"register {name!r} needs values of shape (N, {length}), got {rows.shape}")
-        self._require_beside()
-        if self.program.feed:
-            raise GraphError("a batch takes no feed: give its registers a place in the one that varies")
-        if unset := [each for each in outliving(self.program) if each != name]:
-            raise GraphError(f"a batch needs a pass that sets what it reads: register {unset[0]!r} is read before")
-        shape = len(rows), self.program.width
-        result = np.empty(shape) if out is None else out
-        require_out(result, shape, rows)
-        write_batch(*self.columns(name), rows.T, result.T, count)
-        return result
+    def text(self, x: str) -> str:
+        """What one pass from this register to the record is run as."""
 
     @abstractmethod
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
-        """Machine code of memories in lanes, see `LaneCode`; none in Python, with a feed, or of what runs alone.
+        """Machine code of memories in lanes; none in Python, with a feed, or of what runs alone.
 
         clock: a register of length 1.  results: registers that are read after a run.  alike: whether a memory has the
-        bits that it has alone; else sines and such are those of vectors, as of `run` with N memories.
+        bits that it has alone; else sines and such are those of vectors.
         """
-
-    @abstractmethod
-    def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
-        """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
-
-        The arrays, contiguous and of as many numbers, are not checked; a `Map` that writes y has elements in whole
-        vectors. With it come the other registers, zeros.
-        """
-
-    @abstractmethod
-    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
-        """The k worth a thread's start, and a writer of records, (width, k), of values of a register, (length, k).
-
-        start: gives initial values of other registers (default 0).
-        """
-
-    def _require_beside(self) -> None:
-        if alone := self.program.alone:
-            raise GraphError(f"programs with {', '.join(alone)} run one memory at a time, not side by side")
-
-    def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
-        """The rows of a feed, of that shape; the last dimension may be one for all."""
-        rows = real_array("feed", () if feed is None else feed)
-        if rows.shape not in (shape, (*shape[:2], 1)[: len(shape)]):
-            raise GraphError(f"the program needs a feed of shape {shape}, got {rows.shape}")
-        return rows
-
-    def _check(self, memory: Array, shape: tuple[int, ...], passes: int, every: int) -> None:
-        fits = isinstance(memory, np.ndarray) and memory.dtype == np.float64 and memory.shape == shape
-        if not fits or not memory.flags.c_contiguous:
-            raise GraphError(f"a memory must be contiguous float64 of shape {shape}, got {describe(memory)}")
-        require_whole("passes", passes)
-        require_whole("every", every, 1)
 
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...

@@ -298,7 +298,7 @@ def sum_text(statement: Sum, writer: Writer) -> None:
 def _of_elements(statement: Map | Sum, outputs: tuple[int, ...], writer: Writer) -> str:
     """The function that runs the graph for every element, where results have these lengths."""
     before, of, count = writer.before, writer.lengths, elements(statement, writer.registers)
-    apart = [name in before.outputs for name in statement.inputs] if isinstance(before, Call) else []
+    apart = tuple([name in before.outputs for name in statement.inputs]) if isinstance(before, Call) else ()
     asked = isinstance(statement, Map) and bool(statement.asked)
     lengths = of(statement.shared), of(statement.inputs), outputs
-    return writer.functions.map(statement.graph, *lengths, count, apart, asked=asked)
+    return writer.functions.map(statement.graph, *lengths, count, apart, asked)

@@ -55,7 +55,7 @@ class VectorCode:
         end = done + most
         while done < end:
             ahead = min(end, int(marks[mark]))
-            record = self._runner.run_many(memory, ahead - done, ahead - done).rows[0]
+            record = self._runner.run(memory, ahead - done, ahead - done).rows[0]
             if ahead == marks[mark]:
                 rows[which, mark], mark = record.T, mark + 1
             done = ahead

@@ -279,14 +279,6 @@ def test_a_bound_jacobian_needs_memory_that_it_can_use(backend):
         function.bind_jacobian(both[:4], both[1:33].reshape(8, 4))
 
 
-def test_large_matrices_are_filled_in(backend, monkeypatch):
-    expected = compiled(example(), backend).jacobian(POINT)
-    monkeypatch.setattr(derivative, "LARGE_MATRIX", 1)
-    function = compiled(example(), backend)
-    assert np.array_equal(function.jacobian(POINT), expected)
-    assert np.array_equal(function.jacobian(POINT, sparse=True).toarray(), expected)
-
-
 def test_a_result_is_the_callers_own_whatever_the_kind_of_array_and_after_a_pickle(backend):
     function = compiled(example(), backend)
     first = function.jacobian(POINT)

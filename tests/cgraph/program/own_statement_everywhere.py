@@ -56,7 +56,7 @@ def one(values: dict[str, Array], k: int) -> dict[str, Array]:
 @pytest.mark.parametrize("backend", RUNNERS)
 def test_its_numbers_alone_and_side_by_side(backend: str) -> None:
     ready = runner(program(While), backend, fma=False)
-    together = ready.run_many(ready.memory(START, COUNT), 1).rows[0]
+    together = ready.run(ready.memory(START, COUNT), 1).rows[0]
     for k in range(COUNT):
         alone = ready.run(ready.memory(one(START, k)), 1).rows[0]
         assert alone == pytest.approx(pairs(*expected(*numbers(k))[:2]), rel=SHORT_SUM, abs=SHORT_SUM)
@@ -70,7 +70,7 @@ def test_its_tangents(backend: str) -> None:
     dots = {name: rng.normal(size=(2, COUNT)) for name in ("f", "z", "u")}
     ready = runner(moved.program, backend, fma=False)
     values = START | {moved.vectors[name]: dot for name, dot in dots.items()}
-    together = ready.run_many(ready.memory(values, COUNT), PASSES).rows[-1]
+    together = ready.run(ready.memory(values, COUNT), PASSES).rows[-1]
     for k in range(COUNT):
         row = ready.run(ready.memory(one(values, k)), PASSES).rows[-1]
         assert row.tolist() == together[:, k].tolist()

@@ -157,19 +157,13 @@ def test_every_lane_has_pivots_of_its_own(backend: str, transposed: bool) -> Non
     assert rows[0, :, 0].tolist() == b[:, 0].tolist()
 
 
-def test_a_batch_of_a_program_with_a_loop(backend: str) -> None:
+def test_many_memories_of_a_program_with_a_loop(backend: str) -> None:
     """From each value of a register of x and n, x halved n times."""
     apart = Call(cg.Graph([X, N], {"x": X, "n": N}), ("both",), ("x", "n"))
-    registers = {"both": 2, "x": 1, "n": 1}
     values = np.stack([np.linspace(-1.0, 1.0, 37), np.arange(37) % 7.0], axis=1)
-    run = runner(Program(registers, [apart, While("n", (HALVE, LESS))], record=["x"]), backend)
-    assert run.batch("both", values)[:, 0].tolist() == (values[:, 0] * 0.5 ** values[:, 1]).tolist()
-    unsure = runner(Program(registers, [apart, If("n", (HALVE,))], record=["x"]), backend)
-    assert unsure.batch("both", values[:2])[:, 0].tolist() == [-1.0, values[1, 0] / 2.0]
-    seldom = If("n", (Call(HALVE.graph, ("x",), ("y",)),))
-    sometimes = runner(Program({**registers, "y": 1}, [apart, seldom], record=["y"]), backend)
-    with pytest.raises(cg.GraphError, match="register 'y' is read before"):
-        sometimes.batch("both", values)
+    run = runner(Program({"both": 2, "x": 1, "n": 1}, [apart, While("n", (HALVE, LESS))], record=["x"]), backend)
+    rows = run.run(run.memory({"both": values.T}, 37), 1).rows[0, 0]
+    assert rows.tolist() == (values[:, 0] * 0.5 ** values[:, 1]).tolist()
 
 
 def test_what_runs_one_memory_at_a_time_is_told() -> None:
