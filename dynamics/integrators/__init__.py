@@ -8,7 +8,6 @@ from importlib import import_module
 from cgraph._shared import doors, memo
 
 from .explicit import explicit_step
-from .method import Method as Method
 from .problem import (
     Problem as Problem,
     derive as derive,
@@ -20,8 +19,14 @@ from .problem import (
     time_derivative as time_derivative,
     total_energy as total_energy,
 )
-from .step import Step as Step, call as call, each as each, total as total
-from .step_control import measured as measured
+from .step import (
+    Step as Step,
+    call as call,
+    each as each,
+    jacobian_statements as jacobian_statements,
+    total as total,
+)
+from .step_control import Method as Method, measured as measured
 from .tableau import (
     COMPOSITIONS,
     DOP853,
@@ -36,7 +41,6 @@ from .tableau import (
 TYPE_CHECKING = False  # as a checker knows it
 
 if TYPE_CHECKING:
-    from .jacobian_statements import jacobian_statements as jacobian_statements
     from .symplectic import mechanics as mechanics
 
 __getattr__, __dir__ = doors(__name__, __file__)

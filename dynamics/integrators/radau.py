@@ -18,9 +18,21 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Call, Factor, FixedPoint, If, Solve, Statement, added, copied, effects
 
-from .jacobian_statements import identity, jacobian_statements
 from .problem import Problem
-from .step import Step, Values, call, combined, count, each, numbered, stage_time, total, weighted
+from .step import (
+    Step,
+    Values,
+    call,
+    combined,
+    count,
+    each,
+    identity,
+    jacobian_statements,
+    numbered,
+    stage_time,
+    total,
+    weighted,
+)
 from .step_control import SCALE, measured, nonfinite, scale
 from .tableau import RowOfWeights
 
@@ -158,20 +170,16 @@ def _sizes(problem: Problem) -> Call:
 
 
 def _matrices(m: int) -> list[Statement]:
-    """Statements that factor the real and the complex matrix of Newton's iteration."""
+    """Statements that factor the real matrix of Newton's iteration, and [[a - J, b], [-b, a - J]], of the size 2 m."""
 
     def complex_matrix(jacobian: list[Node], h: Node) -> Values:
-        """[[a - J, b], [-b, a - J]], of the size 2 m, row by row."""
         a, b = _COMPLEX.real / h, _COMPLEX.imag / h
-        entries: list[Node | float] = []
-        for upper in (True, False):
-            for k in range(m):
-                row = jacobian[k * m : (k + 1) * m]
-                same = [a - entry if column == k else -entry for column, entry in enumerate(row)]
-                other: list[Node | float] = [0.0] * m
-                other[k] = b if upper else -b
-                entries += [*same, *other] if upper else [*other, *same]
-        return {"complex": entries}
+        upper, lower = list[Node | float](), list[Node | float]()
+        for k in range(m):
+            row = [a - entry if j == k else -entry for j, entry in enumerate(jacobian[k * m : (k + 1) * m])]
+            upper += [*row, *[b if j == k else 0.0 for j in range(m)]]
+            lower += [*[-b if j == k else 0.0 for j in range(m)], *row]
+        return {"complex": [*upper, *lower]}
 
     return [
         each(lambda unit, h, jacobian: {"real": _REAL / h * unit - jacobian}),
@@ -201,10 +209,8 @@ def begin(rtol: Node) -> Values:
     newton = cg.maximum(10.0 * EPSILON / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
     return {
         "going": 1.0,
-        "turns": 0.0,
-        "stalled": 0.0,
+        **dict.fromkeys(("turns", "stalled", "converged"), 0.0),
         "change_old": math.inf,
-        "converged": 0.0,
         "exact": cg.equal(rtol, 0.0),
         "newton": cg.where(rtol, newton, 10.0),
     }
@@ -241,9 +247,8 @@ def _judged(numbers: int) -> Call:
     One that will not come to the tolerance in time has not; beside rounding, one that comes no nearer has.
     """
 
-    def judged(
-        change: Node, change_old: Node, turns: Node, stalled: Node, exact: Node, newton: Node, evaluations: Node
-    ) -> Values:
+    def judged(change: Node, change_old: Node, turns: Node, *others: Node) -> Values:
+        stalled, exact, newton, evaluations = others
         size = cg.sqrt(change / numbers)
         rate = size / change_old  # 0 in the first turn
         left = rate / (1.0 - rate) * size
@@ -264,7 +269,7 @@ def _judged(numbers: int) -> Call:
             "evaluations": evaluations + 3.0,
         }
 
-    return call(judged)
+    return call(judged, *"change change_old turns stalled exact newton evaluations".split())
 
 
 def _estimate(problem: Problem) -> list[Statement]:
@@ -277,18 +282,18 @@ def _estimate(problem: Problem) -> list[Statement]:
         right = each(lambda rate, h, *z: {"error_vector": rate + weighted(z, _ERROR) / h}, rate, "h", *Z)
         return [right, Solve("real", "pivots", "error_vector"), *measured("error_vector", problem.size)]
 
+    def again(error: Node, accepted: Node, h_old: Node) -> Values:
+        return {"again": (error > 1.0) * cg.maximum(1.0 - accepted, cg.equal(h_old, 0.0))}
+
+    def finite(error: Node, converged: Node, nonfinite_real: Node, nonfinite_complex: Node) -> Values:
+        return {"error": cg.where(converged, error + nonfinite_real + nonfinite_complex, HALVES)}
+
     rate = Call(problem.rate, ("at", "t", "p"), ("F0",))
     return [
         nonfinite("nonfinite_real", "real"),
         nonfinite("nonfinite_complex", "complex"),
         *filtered("rate"),
-        call(
-            lambda error, accepted, h_old: {"again": (error > 1.0) * cg.maximum(1.0 - accepted, cg.equal(h_old, 0.0))}
-        ),
+        call(again),
         If("again", (added("x", "error_vector", "at"), rate, *filtered("F0"))),
-        call(
-            lambda error, converged, nonfinite_real, nonfinite_complex: {
-                "error": cg.where(converged, error + nonfinite_real + nonfinite_complex, HALVES)
-            }
-        ),
+        call(finite),
     ]

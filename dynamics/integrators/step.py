@@ -4,87 +4,61 @@ from __future__ import annotations
 
 import inspect
 import math
+import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import reduce
 from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import STATEMENTS, Call, Factor, FixedPoint, Map, Statement, Sum, While, copied, effects
+from cgraph._shared import CompressedJacobian, kept_by_first
+from cgraph.extend import (
+    STATEMENTS,
+    Call,
+    Factor,
+    FixedPoint,
+    Map,
+    Statement,
+    Sum,
+    While,
+    compressed_jacobian,
+    copied,
+    effects,
+)
 
-from .problem import Problem
+from .problem import Problem, state_jacobian
 
 # What a step may read of a run; in equal steps and derivatives, which have no tolerance, the others are 0.
 STATES = ("x", "x_new", "atol")
 SHARED = (*STATES, *"t h p rtol leap next end evaluations error at_limit accepted".split())
 Values = Mapping[str, Node | float | Sequence[Node | float]]
 Rule = Callable[..., Values]
+Weights = Sequence[float] | Sequence[Fraction]
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of a method: from the state x at t, of the length h, to x_new, and what is known of it besides.
+    """One step of a method, from the state x at t to x_new, as statements over registers of float64.
 
-    It is statements over registers. Every step has x (m), x_new (m), t, h and p, the values of the problem's
-    parameters, and may set others under any name. Whether it is accepted, how long the next one is, which forces act in
-    it and what its derivatives are is the business of `equal`, `chosen` and `dyn.gradient`.
+    Every step has registers x (m), x_new (m), t, h and p, the values of the problem's parameters, and may set others.
 
-    Parameters
-    ----------
-    lengths : dict, optional
-        Of registers of its own, where its statements do not tell: such as those of one `Call` that sets several.
-    body : sequence of Statement
-        x_new of x, t, h, p and what comes before.
-    rates : sequence of Statement, optional
-        Before all else, from x, t and p.
-    prepare : sequence of Statement, optional
-        Before the body, after `rates`: done once for a state, however many lengths are tried from it.
-    start : sequence of Statement, optional
-        Before the first step.
-    kept : sequence of Statement, optional
-        After an accepted step, with x still the state before: what the next one reads, such as a guess. Its value must
-        not matter where a step starts anew: applied forces may change between two steps.
-    fixed : tuple of str, optional
-        Registers whose values have no derivatives: guesses, roundings, matrices of an iteration.
-    failed : str, optional
-        A register that is not 0 after a step whose equations were not solved. Equations are solved by a `FixedPoint`,
-        to the tolerance of register rtol, and to rounding where that is 0.
-    error : sequence of Statement, optional
-        After the body: the estimated error of x_new in register `error`, 1 at the tolerance; see
-        `step_control.measured`. Without it steps cannot be chosen.
-    estimate : int, optional
-        q, where the estimate falls as h^q.
-    handed : sequence of Statement, optional
-        After an accepted step that was chosen, in place of `rates` before the next: the same from what `error` knows;
-        none, but not None, where `error` leaves it where `rates` does.
-    dense : sequence of Statement, optional
-        After an accepted step: registers dense1, dense2, .. (m), with x(t + s h) = x + sum_k dense_k s^k. Without it
-        the cubic through states and rates at both ends.
-    dense_lengths : dict, optional
-        As `lengths`, of those that only `dense` needs.
-
-    Examples
-    --------
-    Heun's method, which goes by the mean of the slopes at both ends:
-
-    >>> import dynamics as dyn
-    >>> from cgraph.extend import Call
-    >>> from dynamics.integrators import Method, Step, call, each
-    >>> def heun(problem):
-    ...     return Step(
-    ...         rates=[Call(problem.rate, ("x", "t", "p"), ("slope",))],
-    ...         body=[
-    ...             each(lambda x, h, slope: {"at": x + h * slope}),
-    ...             call(lambda t, h: {"end": t + h}),
-    ...             Call(problem.rate, ("at", "end", "p"), ("slope_at_end",)),
-    ...             each(lambda x, h, slope, slope_at_end: {"x_new": x + h * (slope + slope_at_end) / 2}),
-    ...         ],
-    ...     )
-    >>> dyn.METHODS["heun"] = Method(2, heun)
-    >>> decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
-    >>> dyn.simulate(decay, [1.0], None, 1.0, "heun", dt=0.01).q[-1].round(4)
-    array([0.3679])
-    >>> del dyn.METHODS["heun"]
+    lengths: of registers whose length its statements do not tell: of a `Call` that sets several.
+    body: x_new of x, t, h, p and what comes before.
+    rates: before all else, from x, t and p.  prepare: after `rates`, once for a state, whatever lengths are tried.
+    start: before the first step.
+    kept: after an accepted step, with x still the state before: what the next one reads, such as a guess. Its value
+    must not matter where a step starts anew: applied forces may change between two steps.
+    fixed: registers whose values have no derivatives: guesses, roundings, matrices of an iteration.
+    failed: a register that is not 0 after a step whose equations were not solved. They are solved by a `FixedPoint`, to
+    the tolerance of register rtol, and to rounding where that is 0.
+    error: after the body: the estimated error of x_new in register `error`, 1 at the tolerance, see `measured`.
+    estimate: q, where the estimate falls as h^q.
+    handed: after an accepted step that was chosen, in place of `rates` before the next: the same from what `error`
+    knows; none, but not None, where `error` leaves it where `rates` does.
+    dense: after an accepted step: registers dense1, dense2, .. (m), with x(t + s h) = x + sum_k dense_k s^k; by default
+    the cubic through states and rates at both ends.
     """
 
     lengths: Mapping[str, int] = field(default_factory=dict)
@@ -99,7 +73,6 @@ class Step:
     estimate: int = 0
     handed: Sequence[Statement] | None = None
     dense: Sequence[Statement] = ()
-    dense_lengths: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def derived(self) -> list[Statement]:
@@ -121,23 +94,20 @@ def arriving(statements: Sequence[Statement]) -> list[Statement]:
 
 
 def with_registers(step: Step, own: Mapping[str, int], *more: Statement) -> dict[str, int]:
-    """All registers: those of what wraps a step, and its own.
+    """Lengths of all registers: those of what wraps a step, and its own.  more: statements after its body.
 
-    more: its statements besides those from x to the new x.
     Raises ValueError where one name has two meanings, and for a step that does not make x_new of x.
     """
     every = [*step.start, *step.rates, *step.prepare, *step.body, *more, *step.kept]
     written = effects([*step.rates, *step.prepare, *step.body, *step.kept])[1]
     if "x_new" not in written or "x" in written:
         raise ValueError("a step has to write register 'x_new', and to leave 'x' as it is")
-    given = {**step.lengths, **step.dense_lengths}
     reads, writes = effects(every)
-    if twice := [name for name in (*given, *writes) if name in own and name not in SHARED]:
+    if twice := [name for name in (*step.lengths, *writes) if name in own and name not in SHARED]:
         raise ValueError(f"a step cannot have a register {twice[0]!r}: a run has another of that name")
     shared = {name: own["x"] if name in STATES else 1 for name in SHARED if name not in own}
-    lengths = lengths_of(every, {**shared, **given, **own})
-    lengths |= dict.fromkeys([name for name in step.fixed if name not in lengths], 1)
-    return {name: lengths[name] for name in (*given, *reads, *writes, *step.fixed, *own) if name in lengths}
+    lengths = dict.fromkeys(step.fixed, 1) | lengths_of(every, {**shared, **step.lengths, **own})
+    return {name: lengths[name] for name in (*step.lengths, *reads, *writes, *step.fixed, *own) if name in lengths}
 
 
 def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:
@@ -153,33 +123,20 @@ def call(rule: Rule, *reads: str, **lengths: int) -> Call:
     their names are others; one that no result depends on, such as by a weight of 0, is left out.  lengths: of those
     that are lists of several numbers; results may be such lists as well.
 
-    >>> from dynamics.integrators import call
     >>> later = call(lambda t, h: {"t_new": t + h})
     >>> later.inputs, later.outputs
     (('t', 'h'), ('t_new',))
     """
-    graph, inputs, outputs = _formula(rule, reads, lengths)
-    return Call(graph, inputs, outputs)
+    return Call(*_formula(rule, reads, lengths))
 
 
 def each(rule: Rule, *reads: str) -> Map:
-    """Statement that sets registers by a rule of others, see `call`, component by component.
-
-    >>> from dynamics.integrators import each
-    >>> euler = each(lambda x, h, slope: {"x_new": x + h * slope})
-    >>> euler.inputs, euler.outputs
-    (('x', 'h', 'slope'), ('x_new',))
-    """
+    """Statement that sets registers by a rule of others, see `call`, component by component."""
     return Map(*_formula(rule, reads, {}))
 
 
 def total(rule: Rule, *reads: str) -> Sum:
-    """Statement that sets registers to the sums over all components of a rule of others, see `call`.
-
-    >>> from dynamics.integrators import total
-    >>> total(lambda x: {"square": x * x}).outputs
-    ('square',)
-    """
+    """Statement that sets registers to the sums over all components of a rule of others, see `call`."""
     return Sum(*_formula(rule, reads, {}))
 
 
@@ -201,25 +158,30 @@ def _formula(
 
 
 def _end_to_end(values: Iterable[Any]) -> list[Any]:
-    """Numbers, and those of lists."""
     return [number for value in values for number in (value if isinstance(value, list) else [value])]
 
 
 def lengths_of(statements: Iterable[Statement], known: Mapping[str, int]) -> dict[str, int]:
     """Lengths of the registers that statements set, as far as these and those that are known tell.
 
-    Component by component a result is as long as what it is made of, and a sum is one number. The numbers of a call are
-    one for each register, or all of the only one that is not known. Pivots are as many as a matrix has rows.
+    Component by component a result is as long as what it is made of. The numbers of a call are one for each register,
+    or all of the only one that is not known. Pivots are as many as a matrix has rows.
     """
-    every, lengths = list(_inside(statements)), dict(known)
-    for _ in every:
-        before = dict(lengths)
-        for statement in every:
-            for name, length in _told(statement, known, lengths):
-                if name not in known:
-                    lengths[name] = max(length, lengths.get(name, 0))
-        if lengths == before:
-            break
+    lengths = dict(known)
+    for statement in _inside(statements):
+        told: dict[str, int] = {}
+        if isinstance(statement, Factor):
+            told[statement.pivots] = math.isqrt(lengths.get(statement.matrix, 0))
+        elif isinstance(statement, Call | Map | Sum):
+            names, numbers, elements = statement.outputs, len(statement.graph.outputs), 1
+            if isinstance(statement, Map):
+                elements = max([lengths.get(name, 1) for name in statement.inputs], default=1)
+            unknown = [name for name in names if name not in known]
+            if len(names) == numbers:
+                told = dict.fromkeys(unknown, elements)
+            elif len(unknown) == 1:
+                told[unknown[0]] = elements * numbers - sum([known[name] for name in names if name in known])
+        lengths |= {name: max(length, lengths.get(name, 0)) for name, length in told.items()}
     return lengths
 
 
@@ -230,19 +192,28 @@ def _inside(statements: Iterable[Statement]) -> Iterator[Statement]:
             yield from _inside(getattr(statement, body))
 
 
-def _told(statement: Statement, known: Mapping[str, int], lengths: Mapping[str, int]) -> Iterator[tuple[str, int]]:
-    """Registers that a statement sets, with their lengths."""
-    if isinstance(statement, Factor):
-        yield statement.pivots, math.isqrt(lengths.get(statement.matrix, 0))
-    if isinstance(statement, Call | Map | Sum):
-        names, numbers, elements = statement.outputs, len(statement.graph.outputs), 1
-        if isinstance(statement, Map):
-            elements = max([lengths.get(name, 1) for name in statement.inputs], default=1)
-        unknown = [name for name in names if name not in known]
-        if len(names) == numbers:
-            yield from [(name, elements) for name in names]
-        elif len(unknown) == 1:
-            yield unknown[0], elements * numbers - sum([known[name] for name in names if name in known])
+def jacobian_statements(problem: Problem) -> list[Statement]:
+    """df/dx of the registers x, t and p to the register "jacobian", row by row, written out or by colors."""
+    parts = _compressed(problem)
+    if parts is None:
+        return [Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))]
+    rows = tuple(numbered("jacobian", problem.size))
+    return [
+        Call(parts.primal, ("x", "t", "p"), ("known",)),
+        call(lambda: {"color": [float(k) for k in range(parts.colors)]}),
+        Map(parts.product, ("color",), rows, shared=("known",)),
+        Call(parts.entries, rows, ("jacobian",)),
+    ]
+
+
+@kept_by_first
+def _compressed(problem: Problem) -> CompressedJacobian | None:
+    return compressed_jacobian(problem.rate, list(problem.states))
+
+
+def identity(m: int) -> Call:
+    """Register `unit` = the identity matrix, row by row."""
+    return call(lambda: {"unit": [float(row == column) for row in range(m) for column in range(m)]})
 
 
 def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:
@@ -260,10 +231,30 @@ def numbered(register: str, count: int, first: int = 0) -> list[str]:
     return [f"{register}{k}" for k in range(first, first + count)]
 
 
-def advanced(target: str, weights: Sequence[float]) -> Map:
-    """target = x + h * (sum of weight * slope)."""
-    slopes = numbered("slope", len(weights))
-    return each(lambda x, h, *slopes: {target: x + h * weighted(slopes, weights)}, "x", "h", *slopes)
+def advanced(target: str, weights: Weights, base: str = "x", slope: str = "slope") -> Map:
+    """target = base + h * (sum of weight * slope)."""
+
+    def ahead(x: Node, h: Node, *slopes: Node) -> Values:
+        return {target: x + reduce(operator.add, _changes(h, slopes, weights))}
+
+    return each(ahead, base, "h", *numbered(slope, len(weights)))
+
+
+def summed(before: tuple[str, str], after: tuple[str, str], weights: Weights, slope: str = "slope") -> Map:
+    """after = before + h * (sum of weight * slope): a state, and what rounding took off it so far (Kahan)."""
+
+    def end(x: Node, rounding: Node, h: Node, *slopes: Node) -> Values:
+        change, *rest = _changes(h, slopes, weights)
+        return dict(zip(after, compensated(x, change + reduce(operator.add, rest, rounding)), strict=True))
+
+    return each(end, *before, "h", *numbered(slope, len(weights)))
+
+
+def _changes(h: Node, slopes: Sequence[Node], weights: Weights) -> list[Node]:
+    """h * (sum of weight * slope), by the weights as float64 holds them, and by what it leaves of them, if anything."""
+    first = [float(weight) for weight in weights]
+    left = [float(weight - Fraction(number)) for weight, number in zip(weights, first, strict=True)]
+    return [h * weighted(slopes, numbers) for numbers in (first, left) if numbers is first or any(left)]
 
 
 def combined(rows: Sequence[Sequence[float]], sources: Sequence[str], targets: Sequence[str]) -> Map:

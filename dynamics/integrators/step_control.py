@@ -1,30 +1,31 @@
-"""Chosen steps: a method's step, tried until its error is within the tolerance; the registers, and step control.
+"""Methods, and what repeats their steps: of equal lengths, or chosen ones, tried until the error is within tolerance.
 
-A pass is a trial of one step, from t to t_new = t + h exactly, over the registers that `Method` lists. `tried` is its
-size before t_new was rounded; `fresh` is 1 before the first pass.
-
-A run begins with `anew` at 1, and goes on to a trial once it is set out, see `simulation.steps.first_step`: registers
-that a step hands on to the next are 0 then. `search` is positive while a first step is looked for: a trial then is none
-of the run, and not `recorded`. `trials` counts those of the run, of whose steps `longest_made` is the longest; `due` is
-1 after one by which sizes that make up atol are to be looked at, if it is `sized` by them: after 32, and then after
-twice as many.
+A pass of chosen steps is a trial of one, from t to t_new = t + h exactly: of `next`, whose size before t_new was rounded is
+`tried`. rtol |x| + atol is the tolerance; max_step, min_step and end are limits. `status` tells how the run goes, and
+t_old, x_old where the last step began. A run begins with `anew` at 1, which sets registers to 0 that a step hands on to
+the next, and `fresh` at 1, before the first pass. `search` is positive while a first step is looked for (see
+`simulation.steps.first_step`): a trial then is none of the run, and no `row` of its record. `trials` counts those of
+the run; `due` is 1 after one by which sizes that make up atol are to be looked at, if it is `sized` by them.
 
 Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
 missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
 component by `leap`, rtol times that time over h. A step far shorter than those before passes a jump so. A pole stays
 one: on the way to it rates grow by a share of themselves in every step, and by that share the longest step is
-forgotten. On the way to a jump rates stay as they are, however many steps lead there. A step in which nothing moved
-says nothing of forces to come: the next is at most `still`.
+forgotten. On the way to a jump rates stay as they are. A step in which nothing moved says nothing of forces to come:
+the next is at most `still`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
+from cgraph._shared import memo
+from cgraph.extend import STATEMENTS, Call, If, Program, Statement, Sum, copied, effects
 
 from .problem import Problem
 from .step import Step, Values, call, count, each, rate_calls, total, with_registers
@@ -37,7 +38,95 @@ SCALE = ("x", "x_new", "rtol", "atol", "leap")
 FORGOTTEN = 0.1  # of the longest step at most, in every step that is shorter
 COLLAPSE = 2.0**-200  # steps below this share of a run never end it
 HERMITE = 3  # degree of the dense output of a step that has none of its own
+KEPT_METHODS = 32  # methods of an order
+SUM_ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
 SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has no error
+
+
+@dataclass(frozen=True)
+class Method:
+    """An integrator: what `dyn.METHODS` holds, and all that a simulation knows of a method.
+
+    order: p, where the error of a run falls as h^p.
+    step: step(problem) makes the `Step` of a problem, xdot = f(x, t, p) as graphs.
+    adaptive: whether a run chooses its steps by the estimate of their error; if not, steps are equal.
+    degree: of the dense output of chosen steps.
+    finest: the relative tolerance below which a step's own rounding is larger.
+    starts: whether steps need no search for the first, and no limit by the one before, since each is at most what the
+    derivatives at its start allow: `prepare`, which comes before every trial, makes `next` no larger. After a trial
+    that was too long all begins again, with `start`.
+    order_at: of a method whose order goes by the relative tolerance: the order for one, at most `order`. The step is
+    then step(problem, order=..).
+
+    A run of equal steps makes one in a pass and records t and x. Before a pass its registers hold x (m), p, the time
+    t = start + count h, `evaluations` of the rate so far, `fresh`, 1 before the first, and `singular`, after a pass
+    that failed 1 + the index of a coordinate without inertia; the run ends when a pass leaves `nonfinite` other than 0.
+    A run of chosen steps makes one trial in a pass.
+    """
+
+    order: int
+    step: Callable[..., Step]
+    adaptive: bool = False
+    degree: int = HERMITE
+    finest: float = SUM_ROUNDING
+    starts: bool = False
+    order_at: Callable[[float], int] | None = None
+
+    def at(self, rtol: float) -> Method:
+        """The method for runs of a relative tolerance, of the order that this asks for."""
+        return self if self.order_at is None else _of_order(self, self.order_at(rtol))
+
+    def program(self, problem: Problem, dense: bool) -> Program:
+        """The steps of a run, one after another; dense: with dense output where they are chosen.
+
+        Raises ValueError for a method that the model has not, and for a step that lacks what the run needs.
+        """
+        step = self.step(problem)
+        if not self.adaptive:
+            return equal(step, problem)
+        if not step.error or step.estimate < 1:
+            raise ValueError("a method that chooses its steps needs their error, `Step.error`, and `Step.estimate`")
+        return chosen(step, problem, dense=dense, degree=self.degree, starts=self.starts)
+
+    def __repr__(self) -> str:
+        return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"
+
+
+@memo(KEPT_METHODS)
+def _of_order(method: Method, order: int) -> Method:
+    """The method of one order; the same object for the same, since problems keep programs by it."""
+    step = partial(method.step, order=order)
+    return replace(method, order=order, degree=order, step=step, order_at=None)
+
+
+def equal_registers(problem: Problem) -> dict[str, int]:
+    """Registers of every program of equal steps."""
+    single = dict.fromkeys(("t", "h", "start", "count", "evaluations", "nonfinite"), 1)
+    return {"x": problem.size, "x_new": problem.size, "p": len(problem.parameters), **single}
+
+
+def equal(step: Step, problem: Problem) -> Program:
+    """Equal steps: one step a pass, of a length that is given, over and over."""
+    lengths = with_registers(step, equal_registers(problem))
+    made = float(rate_calls(problem, step.rates, step.prepare, step.body))
+
+    def ended(start: Node, count: Node, h: Node, evaluations: Node) -> Values:
+        """The next time, computed from the start without drift."""
+        return {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": evaluations + made}
+
+    def failed(nonfinite: Node, failed: Node, *singular: Node) -> Values:
+        """Of what goes on, an inertia that is negative says nothing."""
+        bad = nonfinite + failed
+        kept = {"singular": cg.where(bad, singular[0], 0.0)} if singular else {}
+        return {"nonfinite": bad, step.failed: 0.0, **kept}
+
+    body = [*step.derived, call(ended), nonfinite("nonfinite", "x")]
+    if step.failed:
+        body.append(call(failed, "nonfinite", step.failed, *(["singular"] if "singular" in lengths else [])))
+    if step.start:
+        body.insert(0, first_pass(*step.start))
+        lengths["fresh"] = 1
+    return Program(lengths, body, record=["t", "x"], stop="nonfinite")
 
 
 def registers(problem: Problem) -> dict[str, int]:
@@ -45,14 +134,8 @@ def registers(problem: Problem) -> dict[str, int]:
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
     names += " evaluations at_limit t_old t_new jump longest leap still moved turned anew search trials due"
     names += " sized seen row largest longest_made"
-    m = problem.size
-    states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
+    states = dict.fromkeys(("x", "x_new", "x_old", "atol"), problem.size)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
-
-
-def recorded(dense: bool, degree: int) -> list[str]:
-    """Registers that a row of the record holds."""
-    return ["t", "h", "x", *(["t_old", "x_old", *(f"dense{k + 1}" for k in range(degree))] if dense else [])]
 
 
 @call
@@ -74,12 +157,10 @@ def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
 
 
 def control(more: int) -> Call:
-    """Call that accepts a trial or not, by its estimate. A NaN is an error beyond measure.
+    """Call that accepts a trial or not, by its estimate.  more: evaluations of the rate in a trial.
 
-    A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
-    be so short.
-
-    more: evaluations of the rate in a trial.
+    A NaN is an error beyond measure. A step below the resolution of t, or of the run, is not accepted whatever its
+    error: only one that ends the run may be so short.
     """
     names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen".split()
 
@@ -106,9 +187,9 @@ def control(more: int) -> Call:
 
 
 def accept_step(order: int, *after: Statement, starts: bool) -> If:
-    """An accepted step becomes the state; `after` is what the method does besides, with x still the old state.
+    """An accepted step becomes the state.
 
-    order: of the step's size in the estimate.  starts: see `chosen`.
+    order: of the step's size in the estimate.  after: what the method does besides, with x still the old state.
     """
 
     def grown(error: Node, error_old: Node, tried: Node, next_: Node, largest: Node) -> Values:
@@ -141,10 +222,7 @@ def longest_step(h: Node, longest: Node, turned: Node) -> Values:
 
 @total
 def turn_of_rates(h: Node, t: Node, t_old: Node, x: Node, x_new: Node, x_old: Node) -> Values:
-    """Squares of changes of the mean rate, each a share of the larger one, as ways in the time of this step.
-
-    Before the first step there is none.
-    """
+    """Squares of changes of the mean rate, each a share of the larger one, as ways in the time of this step."""
     before = cg.where(cg.equal(t, t_old), 0.0, h / (t - t_old)) * (x - x_old)
     way = x_new - x
     share = abs(way - before) / cg.maximum(cg.maximum(abs(way), abs(before)), SMALLEST_ATOL)
@@ -157,14 +235,11 @@ def first_pass(*statements: Statement) -> If:
 
 
 def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
-    """A trial of one step a pass.
-
-    starts: whether the next step is at most what the derivatives at its start allow, whatever the one before was. After
-    a trial that was too long the rates are those of its end, so that all begins again.
-    """
+    """A trial of one step a pass.  starts: see `Method`."""
     polynomial = (step.dense or _hermite(problem)) if dense else ()
+    coefficients = [f"dense{k + 1}" for k in range(degree)] if dense else []
     lengths = with_registers(step, registers(problem), *step.error, *(step.handed or ()), *polynomial)
-    lengths |= dict.fromkeys([f"dense{k + 1}" for k in range(degree if dense else 0)], problem.size)
+    lengths |= dict.fromkeys(coefficients, problem.size)
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
     first, again = ([*step.start, *rates], prepare) if step.handed is not None else (step.start, [*rates, *prepare])
     body = _forgotten(step, problem)
@@ -172,11 +247,11 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
         body.append(first_pass(*first))
     if again:
         body += again if starts else [If("accepted", tuple(again))]
-    body += [trial, *step.body, *step.error]
-    body.append(control(rate_calls(problem, step.body, step.error)))
+    body += [trial, *step.body, *step.error, control(rate_calls(problem, step.body, step.error))]
     after = [If("row", (*polynomial, *_counted(problem, polynomial)))] if dense else []
     body.append(accept_step(step.estimate, *after, *step.kept, *(step.handed or ()), starts=starts))
-    return Program(lengths, body, recorded(dense, degree), record_if="row", stop="status")
+    record = ["t", "h", "x", *(["t_old", "x_old", *coefficients] if dense else [])]
+    return Program(lengths, body, record, record_if="row", stop="status")
 
 
 def _forgotten(step: Step, problem: Problem) -> list[Statement]:
@@ -189,10 +264,10 @@ def _forgotten(step: Step, problem: Problem) -> list[Statement]:
         first |= {name: None for name in reads if name not in written}
         if not STATEMENTS[type(statement)].bodies:  # which may run no time at all
             written |= {*writes}
-    return [If("anew", tuple([Map(ZERO, (name,), (name,)) for name in (*first, "anew")]), seldom=True)]
-
-
-ZERO = each(lambda a: {"zero": 0.0}).graph
+    zero = each(lambda a: {"a": 0.0})
+    return [
+        If("anew", tuple([replace(zero, inputs=(name,), outputs=(name,)) for name in (*first, "anew")]), seldom=True)
+    ]
 
 
 def _counted(problem: Problem, statements: Sequence[Statement]) -> list[Call]:

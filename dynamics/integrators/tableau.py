@@ -27,47 +27,13 @@ class Tableau:
     Stage k is taken at t + c_k h and x + h sum_j a_kj slope_j; the step adds h sum_k b_k slope_k. A tableau with
     weights of an error estimate is an embedded method, which chooses its steps.
 
-    Parameters
-    ----------
-    order : int
-        p, where the error of a run falls as h^p.
-    c : tuple
-        Times of the stages, s numbers, the first 0.
-    a : tuple of tuples
-        Row k the weights of the slopes before stage k, k numbers.
-    b : tuple
-        Weights of the slopes in the step, s numbers.
-    error : tuple of tuples, optional
-        Weights of h slope_k in an estimate of the error of the step, s + 1 numbers, the last for the slope at the end
-        of the step. DOP853 has two estimates, which are combined.
-    estimate : int, optional
-        q, where the estimate falls as h^q; needed with `error`.
-    dense : tuple of tuples, optional
-        Row k the weights of slope k in the coefficients of s, s^2, .. of the dense output; without them the cubic
-        through states and slopes at both ends.
-    extra : tuple of (float, tuple), optional
-        Stages (c_k, a_k) that only the dense output needs.
-
-    Raises
-    ------
-    ValueError
-        For weights that are not as many as their stages, and for `error` without `estimate`.
-
-    Examples
-    --------
-    Kutta's 3/8 rule, as a method of `simulate` from here on:
-
-    >>> import dynamics as dyn
-    >>> from dynamics.integrators import Tableau, runge_kutta
-    >>> a = ((), (1 / 3,), (-1 / 3, 1), (1, -1, 1))
-    >>> rule = Tableau(4, c=(0, 1 / 3, 2 / 3, 1), a=a, b=(1 / 8, 3 / 8, 3 / 8, 1 / 8))
-    >>> dyn.METHODS["kutta38"] = runge_kutta(rule)
-    >>> dyn.METHODS["kutta38"]
-    <Method of order 4, equal steps>
-    >>> decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
-    >>> dyn.simulate(decay, [1.0], None, 1.0, "kutta38", dt=0.1).q[-1].round(6)
-    array([0.36788])
-    >>> del dyn.METHODS["kutta38"]
+    order: p, where the error of a run falls as h^p.
+    c: times of the stages, s numbers, the first 0.  a: row k the weights of the slopes before stage k, k numbers.
+    b: weights of the slopes in the step, s numbers.
+    error: rows of s + 1 weights of h slope_k in an estimate of the error of the step, the last for the slope at its
+    end. DOP853 has two estimates, which are combined.  estimate: q, where the estimate falls as h^q.
+    dense: row k the weights of slope k in the coefficients of s, s^2, .. of the dense output; without them the cubic
+    through states and slopes at both ends.  extra: stages (c_k, a_k) that only the dense output needs.
     """
 
     order: int
@@ -206,10 +172,9 @@ def _dense() -> tuple[RowOfWeights, ...]:
     x + s (F0 + (1 - s) (F1 + s (F2 + (1 - s) (F3 + s (F4 + (1 - s) (F5 + s F6)))))), with F0 the whole step, F1 and F2
     of Hermite's kind and the other F from the table.
     """
-    stages = 16
-    whole, first, last = np.array(_row(_B, stages)), np.eye(stages)[0], np.eye(stages)[12]
-    parts = [whole, first - whole, 2.0 * whole - first - last, *(np.array(_row(weights, stages)) for weights in _D)]
-    powers = np.zeros((len(parts) + 1, stages))
+    whole, first, last = np.array(_row(_B, 16)), np.eye(16)[0], np.eye(16)[12]
+    parts = [whole, first - whole, 2.0 * whole - first - last, *(np.array(_row(weights, 16)) for weights in _D)]
+    powers = np.zeros((len(parts) + 1, 16))
     for k, part in reversed(list(enumerate(parts))):
         powers[0] += part
         shifted = np.roll(powers, 1, axis=0)
@@ -246,7 +211,7 @@ def real_stability(tableau: Tableau) -> float:
 
 DIGITS = 50  # of the numbers of Gauss's methods
 NEWTON = 8  # steps that make 50 digits of a guess that has two or three
-_0, _1 = Fraction(0), Fraction(1)
+_0, HALF, _1 = Fraction(0), Fraction(1, 2), Fraction(1)
 
 
 @dataclass(frozen=True)
@@ -267,8 +232,8 @@ def gauss(stages: int) -> Partitioned:
     w_j (c_i + sum over 0 < k < s of P_k(x_j) (P_k+1(x_i) - P_k-1(x_i)) / 2)  (Hairer and Wanner II, section IV.5).
     """
     roots = [_root(stages, i) for i in reversed(range(stages))]
-    p = [_legendre(stages, x) for x in roots]
-    w = [_rounded(1 / ((1 - x * x) * _slope(values, x) ** 2)) for x, values in zip(roots, p, strict=True)]
+    p, slopes = zip(*[_legendre(stages, x) for x in roots], strict=True)
+    w = [_rounded(1 / ((1 - x * x) * slope**2)) for x, slope in zip(roots, slopes, strict=True)]
     a = []
     for x, here in zip(roots, p, strict=True):
         rises = [(here[k + 1] - here[k - 1]) / 2 for k in range(1, stages)]
@@ -278,26 +243,20 @@ def gauss(stages: int) -> Partitioned:
     return Partitioned(2 * stages, rows, rows, tuple(w), tuple([sum(row, _0) for row in rows]))
 
 
-def _legendre(degree: int, x: Fraction) -> list[Fraction]:
-    """P_0(x) .. P_degree(x)."""
+def _legendre(s: int, x: Fraction) -> tuple[list[Fraction], Fraction]:
+    """P_0(x) .. P_s(x), and P_s'(x)."""
     p = [_1, x]
-    for k in range(1, degree):
+    for k in range(1, s):
         p.append(_rounded(((2 * k + 1) * x * p[k] - k * p[k - 1]) / (k + 1)))
-    return p
+    return p, s * (x * p[s] - p[s - 1]) / (x * x - 1)
 
 
-def _slope(p: list[Fraction], x: Fraction) -> Fraction:
-    """P_s'(x) of P_0(x) .. P_s(x)."""
-    s = len(p) - 1
-    return s * (x * p[s] - p[s - 1]) / (x * x - 1)
-
-
-def _root(degree: int, i: int) -> Fraction:
-    """Root i of Legendre's polynomial, from the largest down, by Newton's method."""
-    x = _rounded(Fraction(math.cos(math.pi * (i + 0.75) / (degree + 0.5))))
+def _root(s: int, i: int) -> Fraction:
+    """Root i of P_s, from the largest down, by Newton's method."""
+    x = _rounded(Fraction(math.cos(math.pi * (i + 0.75) / (s + 0.5))))
     for _ in range(NEWTON):
-        p = _legendre(degree, x)
-        x = _rounded(x - p[degree] / _slope(p, x))
+        p, slope = _legendre(s, x)
+        x = _rounded(x - p[s] / slope)
     return x
 
 
@@ -305,13 +264,8 @@ def _rounded(x: Fraction) -> Fraction:
     return Fraction(round(x * 10**DIGITS), 10**DIGITS)
 
 
-def over(denominator: int, *numerators: int) -> Fractions:
-    """The numerators, each over the denominator."""
-    return tuple([Fraction(numerator, denominator) for numerator in numerators])
-
-
 SYMPLECTIC_EULER = Partitioned(1, a=((_0,),), b=((_1,),), w=(_1,), c=(_0,))
-VERLET = Partitioned(2, a=(over(2, 0, 0), over(2, 1, 1)), b=(over(2, 1, 0),) * 2, w=over(2, 1, 1), c=(_0, _1))
+VERLET = Partitioned(2, a=((_0, _0), (HALF, HALF)), b=((HALF, _0),) * 2, w=(HALF, HALF), c=(_0, _1))
 MIDPOINT = gauss(1)
 PARTITIONED = {"symplectic_euler": SYMPLECTIC_EULER, "verlet": VERLET, "midpoint": MIDPOINT}
 PARTITIONED |= {"gauss4": gauss(2), "gauss6": gauss(3)}

@@ -39,15 +39,11 @@ def equal_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
 
 
 def _divided(begin: float, end: float, count: int) -> EqualSteps:
-    """So many steps from begin to end."""
     return EqualSteps(begin, (end - begin) / count, count, end)
 
 
 def even_steps(instants: Sequence[float], dt: float) -> tuple[list[EqualSteps], Numbers]:
-    """Equal steps as of `equal_steps`, with instants that are evenly spaced, to rounding, in one stretch.
-
-    With them, how many are done at the instants.
-    """
+    """Equal steps with instants that are evenly spaced, to rounding, in one stretch; and how many are done at them."""
     times = np.array(instants)
     gaps, ulps = np.diff(times), np.spacing(np.maximum(np.abs(times[:-1]), np.abs(times[1:])))
     breaks = np.flatnonzero(np.abs(np.diff(gaps)) > EVEN * ulps[1:]) + 1

@@ -56,13 +56,13 @@ class FlatPosition:
         if not lost:
             return ""
         _, shares, x = min(lost, key=lambda each: each[0])
-        taking_part = zip(self._rows.outputs, shares >= PART * shares.max(), strict=True)
-        rows = [repr(name) for name, part in taking_part if part]
-        place = ", ".join(
-            [f"{name} = {value:.6g}" for name, value in zip(self._components, x[: self._nq], strict=False)]
-        )
+        rows = [
+            f"{name!r}" for name, share in zip(self._rows.outputs, shares, strict=True) if share >= PART * shares.max()
+        ]
+        place = [f"{name} = {value:.6g}" for name, value in zip(self._components, x[: self._nq], strict=False)]
         verb = "says" if len(rows) == 1 else "say"
-        return f"; near by {' and '.join(rows)} {verb} nothing that the other constraints do not say: {place:.300}"
+        said = f"{' and '.join(rows)} {verb} nothing that the other constraints do not say"
+        return f"; near by {said}: {', '.join(place):.300}"
 
     def _singular(self, t: float, x: Array) -> tuple[float, Array]:
         """The least singular value of J beside the largest, and of how much of each row it is, (m,)."""

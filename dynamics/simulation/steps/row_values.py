@@ -58,19 +58,16 @@ def origin(
     rate: over the states, t and forces.  times: (T,).  states: (T, m).  held: forces, (T, p) or ().
     beyond: the step [s] of a run that stopped at the last row, which is taken along the rate; 0 of one that did not.
     """
-    forces = np.broadcast_to(held, (len(times), len(rate.inputs) - states.shape[1] - 1))
-    tried = [(times, states, forces)]
+    m, forces = states.shape[1], np.broadcast_to(held, (len(times), len(rate.inputs) - states.shape[1] - 1))
+    tried = [np.column_stack([states, times, forces])]
     if beyond and len(times):
         direction = -1.0 if len(times) > 1 and times[-1] < times[0] else 1.0
-        slope = row_values(rate, times[-1:], states[-1:], forces[-1:])[0]
         ahead = direction * beyond * np.array([0.5, 1.0])
-        tried.append((times[-1] + ahead, states[-1] + ahead[:, None] * slope, np.repeat(forces[-1:], 2, axis=0)))
-    for graph in (rate, cg.jacobian(rate, list(rate.inputs[: states.shape[1]]))):
-        for t, rows, force in tried:
-            bad = np.flatnonzero(~np.isfinite(row_values(graph, t, rows, force)).all(axis=1))
-            if len(bad):
-                k = int(bad[0])
-                return cg.why_nan(
-                    rate, dict(zip(rate.input_names, [*rows[k], t[k], *force[k]], strict=True)), names=names
-                )
+        further = states[-1:] + ahead[:, None] * row_values(rate, times[-1:], states[-1:], forces[-1:])
+        tried.append(np.column_stack([further, times[-1] + ahead, np.repeat(forces[-1:], 2, axis=0)]))
+    for graph in (rate, cg.jacobian(rate, list(rate.inputs[:m]))):
+        for rows in tried:
+            values = row_values(graph, rows[:, m], rows[:, :m], rows[:, m + 1 :])
+            if len(bad := np.flatnonzero(~np.isfinite(values).all(axis=1))):
+                return cg.why_nan(rate, dict(zip(rate.input_names, rows[bad[0]], strict=True)), names=names)
     return _shared.WhyNan(rate)

@@ -11,14 +11,13 @@ import numpy as np
 
 from cgraph import Graph
 from cgraph._shared import kept_by_first, memo
-from cgraph.extend import Call, Factor, If, Program, Runner, Statement, runner
+from cgraph.extend import Call, Factor, If, Map, Program, Runner, Statement, runner
 
 from ...integrators import Method, Problem
-from ...integrators.jacobian_statements import prices
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
 from .first_step import with_first_step
-from .state_sizes import StateKinds
+from .state_sizes import StateKinds, state_kinds
 
 KEPT = 8  # programs from elsewhere that a process keeps ready
 
@@ -71,8 +70,25 @@ class CompiledSteps:
 
     @cached_property
     def prices(self) -> tuple[float, float]:
-        """Prices of an evaluation of the Jacobian and of a factorization, in evaluations of the rate."""
-        return prices(self.program.steps, self.program.rate) if self.factorizations else (0.0, 0.0)
+        """Operations of the Jacobian and of an LU factorization, the mean of all, in those of the rate; 0 without.
+
+        A factorization of n rows has 2/3 n^3, products, sums and quotients.
+        """
+        steps, jacobian, factors = self.program.steps, 0, list[float]()
+        for each in steps.statements():
+            if isinstance(each, Call | Map) and any(
+                name == "known" or name.startswith("jacobian") for name in each.outputs
+            ):
+                turns = steps.registers[each.inputs[0]] if isinstance(each, Map) else 1
+                jacobian += turns * _operations(each.graph)
+            elif isinstance(each, Factor):
+                factors.append(2.0 / 3.0 * steps.registers[each.pivots] ** 3)
+        one = max(1, _operations(self.program.rate))
+        return (jacobian / one, sum(factors) / len(factors) / one) if factors else (0.0, 0.0)
+
+
+def _operations(graph: Graph) -> int:
+    return sum(bool(node.args) for node in graph.nodes)
 
 
 @kept_by_first
@@ -96,32 +112,11 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         dense and method.adaptive,
         method.finest,
         kinds,
-        between(problem),
+        # between the ends of steps a projection serves where states and t are all that it needs
+        problem.normalization if problem.projection is None or problem.parameters else problem.projection,
         problem.nq,
         constraint_rates(problem) if method.adaptive else None,
     )
-
-
-def state_kinds(problem: Problem) -> StateKinds:
-    """Components that can be compared.
-
-    Coordinates are a kind, and velocities; those of no known length are others, and so is a group of several
-    coordinates, such as a quaternion.
-    """
-    system, every = problem.system, tuple(range(problem.size))
-    lengths = tuple([size or 1.0 for size in problem.lengths])
-    if system is None:
-        return StateKinds(every, every, lengths, ordinary=True, moved=((),) * problem.size)
-    groups = [system.kinematics.groups.index(group) for group in system.kinematics.groups]  # by their first
-    alone = [group if groups.count(group) > 1 else None for group in groups] + [None] * system.n
-    kinds = [
-        (k < problem.nq, not size, group) for k, (size, group) in enumerate(zip(problem.lengths, alone, strict=True))
-    ]
-    alike = tuple([kinds.index(kind) for kind in kinds])
-    known = [bool(size) for size in problem.lengths]
-    moved = [tuple([j for j in every[: problem.nq] if known[j] == known[k]]) for k in every[problem.nq :]]
-    moved = [()] * problem.nq + ([()] * system.n if problem.momenta else moved)
-    return StateKinds(alike, (*groups, *every[problem.nq :]), lengths, ordinary=False, moved=tuple(moved))
 
 
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
@@ -144,13 +139,6 @@ def normalizing(problem: Problem, time: str) -> list[Statement]:
     if problem.projection is not None:
         return [Call(problem.projection, ("x", time, "p"), ("x",))]
     return [] if problem.normalization is None else [Call(problem.normalization, ("x",), ("x",))]
-
-
-def between(problem: Problem) -> Graph | None:
-    """Graph through which states between the ends of steps go: the projection where states and t are all it needs."""
-    if problem.projection is None or problem.parameters:
-        return problem.normalization
-    return problem.projection
 
 
 @kept_by_first

@@ -5,9 +5,9 @@ import pytest
 
 import dynamics as dyn
 from cgraph.extend import Map, Program, runner
-from dynamics.integrators.jacobian_statements import jacobian_statements
-from dynamics.integrators.problem import derive, state_jacobian
-from dynamics.integrators.step import lengths_of
+from dynamics.integrators import derive
+from dynamics.integrators.problem import state_jacobian
+from dynamics.integrators.step import jacobian_statements, lengths_of
 from tests.tolerances import EQUATIONS
 
 

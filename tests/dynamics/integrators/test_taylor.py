@@ -60,8 +60,8 @@ def test_the_order_follows_the_tolerance_and_the_time_has_no_unit() -> None:
 
 def test_a_series_that_is_too_long_is_refused() -> None:
     arm = dyn.planar_arm([1.0] * 20, [1.0] * 20)
-    with raises(ValueError, match=r"of order 22 needs \d+ operations .* at most 300000: take another method, such as"):
-        dyn.prepare(arm, "taylor", rtol=1e-15)
+    with raises(ValueError, match=r"of order 21 needs \d+ operations .* at most 300000: take another method, such as"):
+        dyn.simulate(arm, [0.1] * 20, [0.0] * 20, 1.0, "taylor", rtol=1e-15)
     seven = derive(dyn.planar_arm([1.0] * 7, [1.0] * 7), {})
     assert "x" in dyn.METHODS["taylor"].program(seven, False).registers  # of order 22
 
