@@ -25,7 +25,7 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
         return Step(body=[*body, advanced("x_new", tableau.b)], rates=rates)
     for k, (c, row) in enumerate(tableau.extra, start=stages + 1):
         dense += [advanced("inside", row), *_slope(problem, k, c, "inside")]
-    dense += [_power(k, row) for k, row in enumerate(zip(*tableau.interpolant, strict=True), start=1)]
+    dense += [_power(k, row) for k, row in enumerate(zip(*tableau.dense, strict=True), start=1)]
     return Step(
         body=[*body, summed(("x", "rounding"), ("x_new", "rounding_new"), tableau.b)],
         rates=rates,

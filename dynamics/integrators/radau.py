@@ -12,8 +12,6 @@ import math
 from dataclasses import replace
 from functools import reduce
 
-import numpy as np
-
 import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Call, Factor, FixedPoint, If, Solve, Statement, added, copied, effects
@@ -34,19 +32,26 @@ from .step import (
     weighted,
 )
 from .step_control import SCALE, measured, nonfinite, scale
-from .tableau import RowOfWeights
 
 _R6 = math.sqrt(6.0)
 _C = ((4.0 - _R6) / 10.0, (4.0 + _R6) / 10.0, 1.0)
-_A = np.array(
-    [
-        [(88 - 7 * _R6) / 360, (296 - 169 * _R6) / 1800, (-2 + 3 * _R6) / 225],
-        [(296 + 169 * _R6) / 1800, (88 + 7 * _R6) / 360, (-2 - 3 * _R6) / 225],
-        [(16 - _R6) / 36, (16 + _R6) / 36, 1 / 9],
-    ]
-)
-_REAL = 3.0 + 3.0 ** (2 / 3) - 3.0 ** (1 / 3)  # eigenvalues of the inverse of A
+_REAL = 3.0 + 3.0 ** (2 / 3) - 3.0 ** (1 / 3)  # eigenvalues of A^-1
 _COMPLEX = complex(3.0 + 0.5 * (3.0 ** (1 / 3) - 3.0 ** (2 / 3)), 0.5 * (3.0 ** (5 / 6) + 3.0 ** (7 / 6)))
+_T = (  # columns: the real eigenvector of A^-1, and the real and imaginary part of the complex one
+    (-0.09123239487089298, -0.13132873395769526, -0.0),
+    (-0.24171793270710704, 0.25399349123779613, -0.30203528293465726),
+    (-0.9660481826150928, 0.8895251640260028, 0.18910246025104693),
+)
+_T_INVERSE = (
+    (-4.325579890063157, -0.33919925181580934, -0.5417705399358749),
+    (-4.609554734755688, 0.23563738984600238, 0.3763610775747559),
+    (-0.41460941294696624, -2.8412544601545533, 0.7500743514894451),
+)
+_POWERS = (  # row k has the weights of the Z in the power s^(k+1) of Z(s) / s, the quadratic through the Z at the nodes
+    (10.048809399827416, -1.3821427331607492, 0.33333333333333326),
+    (-25.62959144707664, 10.296258113743306, -2.6666666666666656),
+    (15.580782047249222, -8.914115380582556, 3.3333333333333326),
+)
 _ERROR = ((-13 - 7 * _R6) / 3, (-13 + 7 * _R6) / 3, -1 / 3)  # weights of Z / h in the estimate
 HALVES = (0.9 / 0.5) ** 4  # the error at which a step of estimate h^4 is halved
 TURNS = 8.0  # of Newton's iteration, at most
@@ -59,23 +64,6 @@ SAME_LENGTH = 1e-10  # relative: lengths of steps that are the same but for the 
 SMALL_COMPONENT = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
 Z, W, F = (numbered(name, 3) for name in "ZWF")
 POWERS, CHANGES = numbered("power", 3, 1), ("right0", "F1", "F2")  # of the guess; of W in a turn
-
-
-def _transformation() -> tuple[list[RowOfWeights], list[RowOfWeights]]:
-    """T and its inverse: columns the real eigenvector of A^-1, and the real and imaginary part of the complex one."""
-    inverse = np.linalg.inv(_A)
-    columns = []
-    for value in (_REAL, _COMPLEX):
-        shifted = inverse - value * np.eye(3)
-        vector = np.linalg.svd(shifted)[2][-1].conj()  # of the smallest singular value, which is 0
-        columns += [vector.real] if value == _REAL else [vector.real, vector.imag]
-    t = np.array(columns).T
-    return [tuple(row) for row in t.tolist()], [tuple(row) for row in np.linalg.inv(t).tolist()]
-
-
-_T, _T_INVERSE = _transformation()
-# Z(s) / s at the nodes c is a quadratic in s: its coefficients, row k of weights of the Z in the power s^(k+1).
-_POWERS = [tuple(row) for row in (np.linalg.inv(np.vander(_C, 3, increasing=True)) / np.array(_C)).tolist()]
 
 
 def radau_step(problem: Problem) -> Step:

@@ -35,44 +35,28 @@ STATES = ("x", "x_new", "atol")
 SHARED = (*STATES, *"t h p rtol leap next end evaluations error at_limit accepted".split())
 Values = Mapping[str, Node | float | Sequence[Node | float]]
 Rule = Callable[..., Values]
-Weights = Sequence[float] | Sequence[Fraction]
+Weights = Sequence[float | Fraction]
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of a method, from the state x at t to x_new, as statements over registers of float64.
+    """One step of a method, from x at t to x_new, as statements over registers; docs/extending.md has an example.
 
-    Every step has registers x (m), x_new (m), t, h and p, the values of the problem's parameters, and may set others.
-
-    lengths: of registers whose length its statements do not tell: of a `Call` that sets several.
-    body: x_new of x, t, h, p and what comes before.
-    rates: before all else, from x, t and p.  prepare: after `rates`, once for a state, whatever lengths are tried.
-    start: before the first step.
-    kept: after an accepted step, with x still the state before: what the next one reads, such as a guess. Its value
-    must not matter where a step starts anew: applied forces may change between two steps.
-    fixed: registers whose values have no derivatives: guesses, roundings, matrices of an iteration.
-    failed: a register that is not 0 after a step whose equations were not solved. They are solved by a `FixedPoint`, to
-    the tolerance of register rtol, and to rounding where that is 0.
-    error: after the body: the estimated error of x_new in register `error`, 1 at the tolerance, see `measured`.
-    estimate: q, where the estimate falls as h^q.
-    handed: after an accepted step that was chosen, in place of `rates` before the next: the same from what `error`
-    knows; none, but not None, where `error` leaves it where `rates` does.
-    dense: after an accepted step: registers dense1, dense2, .. (m), with x(t + s h) = x + sum_k dense_k s^k; by default
-    the cubic through states and rates at both ends.
+    Each has registers x (m), x_new (m), t, h and p, the values of the problem's parameters, and may set others.
     """
 
-    lengths: Mapping[str, int] = field(default_factory=dict)
-    body: Sequence[Statement] = ()
-    rates: Sequence[Statement] = ()
-    prepare: Sequence[Statement] = ()
-    start: Sequence[Statement] = ()
-    kept: Sequence[Statement] = ()
-    fixed: tuple[str, ...] = ()
-    failed: str = ""
-    error: Sequence[Statement] = ()
-    estimate: int = 0
-    handed: Sequence[Statement] | None = None
-    dense: Sequence[Statement] = ()
+    lengths: Mapping[str, int] = field(default_factory=dict)  # of registers that a `Call` of several sets
+    body: Sequence[Statement] = ()  # x_new of x, t, h, p and what comes before
+    rates: Sequence[Statement] = ()  # before all else, from x, t and p
+    prepare: Sequence[Statement] = ()  # after `rates`, once for a state, whatever lengths are tried from it
+    start: Sequence[Statement] = ()  # before the first step
+    kept: Sequence[Statement] = ()  # after an accepted step, with x still the old state: what the next may guess by
+    fixed: tuple[str, ...] = ()  # registers without derivatives: guesses, roundings, matrices of an iteration
+    failed: str = ""  # the register that is not 0 after a step whose equations were not solved
+    error: Sequence[Statement] = ()  # after the body: register `error`, 1 at the tolerance, see `measured`
+    estimate: int = 0  # q, where the estimate falls as h^q
+    handed: Sequence[Statement] | None = None  # after an accepted chosen step, in place of the next one's `rates`
+    dense: Sequence[Statement] = ()  # after an accepted one: dense1, dense2, ..: x(t + s h) = x + sum_k dense_k s^k
 
     @property
     def derived(self) -> list[Statement]:

@@ -1,18 +1,14 @@
 """Methods, and what repeats their steps: of equal lengths, or chosen ones, tried until the error is within tolerance.
 
-A pass of chosen steps is a trial of one, from t to t_new = t + h exactly: of `next`, whose size before t_new was rounded is
-`tried`. rtol |x| + atol is the tolerance; max_step, min_step and end are limits. `status` tells how the run goes, and
-t_old, x_old where the last step began. A run begins with `anew` at 1, which sets registers to 0 that a step hands on to
-the next, and `fresh` at 1, before the first pass. `search` is positive while a first step is looked for (see
-`simulation.steps.first_step`): a trial then is none of the run, and no `row` of its record. `trials` counts those of
-the run; `due` is 1 after one by which sizes that make up atol are to be looked at, if it is `sized` by them.
+A pass of chosen steps is a trial of one, from t to t_new = t + h exactly, of the size `tried`. `anew` is 1 when a run
+begins, which sets registers to 0 that a step hands on to the next. `search` is positive while a first step is looked
+for (see `simulation.steps.first_step`): a trial then is none of the run, and no `row` of its record. `due` is 1 after a
+trial by which sizes that make up atol are to be looked at, if it is `sized` by them.
 
-Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
-missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
-component by `leap`, rtol times that time over h. A step far shorter than those before passes a jump so. A pole stays
-one: on the way to it rates grow by a share of themselves in every step, and by that share the longest step is
-forgotten. On the way to a jump rates stay as they are. A step in which nothing moved says nothing of forces to come:
-the next is at most `still`.
+A force that jumps may be missed for a share `jump` of the `longest` of the last steps: what its mean rate would make in
+that time counts into the `scale` of a component by `leap`, rtol times that time over h. The longest step is forgotten
+by the share by which rates change, so that a pole stays one. After a step in which nothing moved the next is at most
+`still`. docs/design.md says why.
 """
 
 from __future__ import annotations
@@ -25,10 +21,10 @@ from functools import partial
 import cgraph as cg
 from cgraph import Node
 from cgraph._shared import memo
-from cgraph.extend import STATEMENTS, Call, If, Program, Statement, Sum, copied, effects
+from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
 
 from .problem import Problem
-from .step import Step, Values, call, count, each, rate_calls, total, with_registers
+from .step import Step, Values, call, count, each, numbered, rate_calls, total, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 5.0  # factors from one step to the next
@@ -37,7 +33,6 @@ RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
 SCALE = ("x", "x_new", "rtol", "atol", "leap")
 FORGOTTEN = 0.1  # of the longest step at most, in every step that is shorter
 COLLAPSE = 2.0**-200  # steps below this share of a run never end it
-HERMITE = 3  # degree of the dense output of a step that has none of its own
 KEPT_METHODS = 32  # methods of an order
 SUM_ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
 SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has no error
@@ -47,30 +42,17 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 class Method:
     """An integrator: what `dyn.METHODS` holds, and all that a simulation knows of a method.
 
-    order: p, where the error of a run falls as h^p.
-    step: step(problem) makes the `Step` of a problem, xdot = f(x, t, p) as graphs.
-    adaptive: whether a run chooses its steps by the estimate of their error; if not, steps are equal.
-    degree: of the dense output of chosen steps.
-    finest: the relative tolerance below which a step's own rounding is larger.
     starts: whether steps need no search for the first, and no limit by the one before, since each is at most what the
     derivatives at its start allow: `prepare`, which comes before every trial, makes `next` no larger. After a trial
     that was too long all begins again, with `start`.
-    order_at: of a method whose order goes by the relative tolerance: the order for one, at most `order`. The step is
-    then step(problem, order=..).
-
-    A run of equal steps makes one in a pass and records t and x. Before a pass its registers hold x (m), p, the time
-    t = start + count h, `evaluations` of the rate so far, `fresh`, 1 before the first, and `singular`, after a pass
-    that failed 1 + the index of a coordinate without inertia; the run ends when a pass leaves `nonfinite` other than 0.
-    A run of chosen steps makes one trial in a pass.
     """
 
-    order: int
-    step: Callable[..., Step]
-    adaptive: bool = False
-    degree: int = HERMITE
-    finest: float = SUM_ROUNDING
+    order: int  # p, where the error of a run falls as h^p
+    step: Callable[..., Step]  # of a problem; with order_at of a problem and an order
+    adaptive: bool = False  # whether a run chooses its steps by the estimate of their error
+    finest: float = SUM_ROUNDING  # relative tolerance below which a step's own rounding is larger
     starts: bool = False
-    order_at: Callable[[float], int] | None = None
+    order_at: Callable[[float], int] | None = None  # the order for a relative tolerance, at most `order`
 
     def at(self, rtol: float) -> Method:
         """The method for runs of a relative tolerance, of the order that this asks for."""
@@ -86,7 +68,7 @@ class Method:
             return equal(step, problem)
         if not step.error or step.estimate < 1:
             raise ValueError("a method that chooses its steps needs their error, `Step.error`, and `Step.estimate`")
-        return chosen(step, problem, dense=dense, degree=self.degree, starts=self.starts)
+        return chosen(step, problem, dense=dense, starts=self.starts)
 
     def __repr__(self) -> str:
         return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"
@@ -96,7 +78,7 @@ class Method:
 def _of_order(method: Method, order: int) -> Method:
     """The method of one order; the same object for the same, since problems keep programs by it."""
     step = partial(method.step, order=order)
-    return replace(method, order=order, degree=order, step=step, order_at=None)
+    return replace(method, order=order, step=step, order_at=None)
 
 
 def equal_registers(problem: Problem) -> dict[str, int]:
@@ -162,11 +144,11 @@ def control(more: int) -> Call:
     A NaN is an error beyond measure. A step below the resolution of t, or of the run, is not accepted whatever its
     error: only one that ends the run may be so short.
     """
-    names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen".split()
+    names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen h"
 
     def judged(*values: Node) -> Values:
-        error, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *rest = values
-        search, trials, sized, seen, h, made = rest
+        error, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *others, made = values
+        search, trials, sized, seen, h = others
         arrives = cg.equal(t_new, end)
         able = cg.maximum(arrives, cg.minimum(wanted, max_step) > cg.maximum(min_step, RESOLUTION * abs(t)))
         accepted = able * (error <= 1.0)
@@ -183,7 +165,7 @@ def control(more: int) -> Call:
             "due": sized * (trials + 1.0 >= seen),
         }
 
-    return call(judged, *names, "h", "longest_made")
+    return call(judged, *names.split(), "longest_made")
 
 
 def accept_step(order: int, *after: Statement, starts: bool) -> If:
@@ -234,10 +216,11 @@ def first_pass(*statements: Statement) -> If:
     return If("fresh", (*statements, call(lambda fresh: {"fresh": 0.0})))
 
 
-def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
+def chosen(step: Step, problem: Problem, *, dense: bool, starts: bool) -> Program:
     """A trial of one step a pass.  starts: see `Method`."""
     polynomial = (step.dense or _hermite(problem)) if dense else ()
-    coefficients = [f"dense{k + 1}" for k in range(degree)] if dense else []
+    written = effects(polynomial)[1]
+    coefficients = [name for name in numbered("dense", len(written), 1) if name in written]
     lengths = with_registers(step, registers(problem), *step.error, *(step.handed or ()), *polynomial)
     lengths |= dict.fromkeys(coefficients, problem.size)
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
@@ -264,10 +247,8 @@ def _forgotten(step: Step, problem: Problem) -> list[Statement]:
         first |= {name: None for name in reads if name not in written}
         if not STATEMENTS[type(statement)].bodies:  # which may run no time at all
             written |= {*writes}
-    zero = each(lambda a: {"a": 0.0})
-    return [
-        If("anew", tuple([replace(zero, inputs=(name,), outputs=(name,)) for name in (*first, "anew")]), seldom=True)
-    ]
+    zero = each(lambda a: {"a": 0.0}).graph
+    return [If("anew", tuple([Map(zero, (name,), (name,)) for name in (*first, "anew")]), seldom=True)]
 
 
 def _counted(problem: Problem, statements: Sequence[Statement]) -> list[Call]:
@@ -311,13 +292,6 @@ def moved(m: int) -> list[Statement]:
     return [total(square), longer, copied("onto", "x")]
 
 
-def nonfinite(target: str, *registers: str) -> Sum:
-    """target = 0 where all numbers of registers of one length are finite, else NaN.
-
-    Divided by an infinite number, an error is 0: that of a step with infinite pivots.
-    """
-
-    def none(first: Node, *others: Node) -> Values:
-        return {target: sum([other - other for other in others], first - first)}
-
-    return total(none, *registers)
+def nonfinite(target: str, register: str) -> Sum:
+    """target = 0 where all numbers of a register are finite, else NaN: divided by infinite pivots, an error is 0."""
+    return total(lambda x: {target: x - x}, register)

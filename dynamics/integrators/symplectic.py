@@ -7,10 +7,8 @@ V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sum
 numbers of the method are as exact as two float64: a method is only symplectic as exactly as w_i b_ij + w_j a_ji =
 w_i w_j, and what is missing adds up to a drift of the energy (Hairer, McLachlan and Razakarivony, BIT 2008).
 
-Quasi-velocities have no such momenta, and constraints hold them. Methods of Gauss, and compositions of `midpoint`, step
-the state (q, qd) there, as that of a system of first order. They keep every quadratic invariant, as |q| of a
-quaternion, and the energy and the size of the momentum of a free rotor; and being symmetric, they leave the energy of
-reversible motions without drift.
+Quasi-velocities have no such momenta, and constraints hold them: methods of Gauss, and compositions of `midpoint`, step
+the state (q, qd) there, as that of a system of first order.
 """
 
 from __future__ import annotations
@@ -42,7 +40,6 @@ from cgraph.extend import (
 
 from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import TIME, new_variables
-from ..systems.system import System
 from .problem import Problem, reaches
 from .step import Step, Values, advanced, call, count, numbered, stage_time, summed, total
 from .tableau import HALF, MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned
@@ -52,6 +49,10 @@ CONVERGED = 2.0**-53  # a change below this, relative, is rounding
 DIVERGED = 1e-9  # one above this, when the turns are over, is no convergence: the step is too long
 REPEATS = 8  # Newton steps for the velocity of a momentum that is not linear in it
 ONCE = Composition(2, (1.0,))
+NO_MOMENTA = (
+    "this method advances coordinates and their momenta dL/dqd in turn, which a system of first order, with "
+    "constraints or with quasi-velocities does not have: take 'midpoint', 'gauss4' or 'dop853'"
+)
 
 
 class Mechanics(NamedTuple):
@@ -75,7 +76,7 @@ def mechanics(problem: Problem) -> Mechanics:
     """
     system = problem.system
     if system is None or not problem.canonical:
-        raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
+        raise ValueError(NO_MOMENTA)
     build, n, inertia = Builder(), system.n, (system.lagrangian, system.qd)
     p, (before,) = new_variables("p", n, system.parameters), new_variables("singular", 1, system.parameters)
     bars = cotangents({system.lagrangian: cg.constant(1.0)}, [*system.q, *system.qd], build)
@@ -124,21 +125,8 @@ def partitioned_step(method: Partitioned, problem: Problem, composition: Composi
     if problem.canonical and not problem.momenta:
         return _of_momenta(method, problem, composition)
     if not problem.canonical and method.a is not method.b:
-        raise ValueError(f"this method advances coordinates and {_lacking_momenta(problem.system)}")
+        raise ValueError(NO_MOMENTA)
     return _of_rates(method, problem, composition)
-
-
-def _lacking_momenta(system: System | None) -> str:
-    """Reason why coordinates and momenta cannot be advanced in turn."""
-    if system is None:
-        return "momenta in turn; a system of first order has none"
-    if len(system.constraints):
-        reason = f"constraint {system.constraints.names[0]!r} holds both"
-    else:
-        pairs = zip(system.velocities, system.qd, strict=True)
-        other = next(name for name, velocity in pairs if velocity not in system.q_dot)
-        reason = f"velocity {other!r} is the rate of no coordinate"
-    return f"their momenta in turn, and {reason}: take 'midpoint', 'gauss4' or 'dop853'"
 
 
 def _separable(problem: Problem) -> bool:

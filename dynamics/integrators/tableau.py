@@ -15,11 +15,6 @@ RowOfWeights = tuple[float, ...]
 Fractions = tuple[Fraction, ...]
 
 
-def _count(row: object) -> int:
-    """Numbers of a row, -1 of what is none."""
-    return len(row) if isinstance(row, tuple | list) else -1
-
-
 @dataclass(frozen=True)
 class Tableau:
     """The numbers of an explicit Runge-Kutta method of s stages.
@@ -27,50 +22,27 @@ class Tableau:
     Stage k is taken at t + c_k h and x + h sum_j a_kj slope_j; the step adds h sum_k b_k slope_k. A tableau with
     weights of an error estimate is an embedded method, which chooses its steps.
 
-    order: p, where the error of a run falls as h^p.
-    c: times of the stages, s numbers, the first 0.  a: row k the weights of the slopes before stage k, k numbers.
-    b: weights of the slopes in the step, s numbers.
-    error: rows of s + 1 weights of h slope_k in an estimate of the error of the step, the last for the slope at its
-    end. DOP853 has two estimates, which are combined.  estimate: q, where the estimate falls as h^q.
-    dense: row k the weights of slope k in the coefficients of s, s^2, .. of the dense output; without them the cubic
-    through states and slopes at both ends.  extra: stages (c_k, a_k) that only the dense output needs.
     """
 
     order: int
     c: RowOfWeights
     a: tuple[RowOfWeights, ...]
     b: RowOfWeights
-    error: tuple[RowOfWeights, ...] = ()
-    estimate: int = 0
-    dense: tuple[RowOfWeights, ...] = ()
-    extra: tuple[tuple[float, RowOfWeights], ...] = ()
+    error: tuple[RowOfWeights, ...] = ()  # weights of h slope_k in estimates, the last for the slope at the end
+    estimate: int = 0  # q, where the estimate falls as h^q
+    dense: tuple[RowOfWeights, ...] = ()  # row k: weights of slope k in the coefficients of s, s^2, ..
+    extra: tuple[tuple[float, RowOfWeights], ...] = ()  # stages (c_k, a_k) that only the dense output needs
 
     def __post_init__(self) -> None:
-        stages = len(self.b)
-        if len(self.c) != stages or [_count(row) for row in self.a] != [*range(stages)]:
+        s = len(self.b)
+        fits = len(self.c) == len(self.a) == s and all(len(row) == k for k, row in enumerate(self.a))
+        if not fits or any(not isinstance(row, tuple) or len(row) != s + 1 for row in self.error):
             raise ValueError(
-                f"a tableau of {stages} weights b needs as many times c and rows a of 0 to {stages - 1} numbers, got "
-                f"{len(self.c)} times and rows of {', '.join(str(_count(row)) for row in self.a) or 'none'}"
-            )
-        if wrong := [row for row in self.error if _count(row) != stages + 1]:
-            raise ValueError(
-                f"error of a tableau is a tuple of rows of {stages + 1} weights, one a stage and one for the slope at "
-                f"the end of the step, got {wrong[0]!r:.60} for a row"
+                f"a tableau of {s} weights b needs as many times c, rows a of 0 to {s - 1} weights, and for error rows "
+                f"of {s + 1}, got c={self.c}, a={self.a}, error={self.error}"
             )
         if self.error and self.estimate < 1:
             raise ValueError(f"error of a tableau needs estimate, q where it falls as h^q, got {self.estimate!r}")
-
-    @property
-    def interpolant(self) -> tuple[RowOfWeights, ...]:
-        """`dense`, or in its place the weights of Hermite's cubic, a row for each slope, that at the end included.
-
-        x + s h f0 + s^2 (3 D - h (2 f0 + f1)) + s^3 (h (f0 + f1) - 2 D), with D = h sum_k b_k slope_k.
-        """
-        if self.dense:
-            return self.dense
-        first = [1.0, *[0.0] * len(self.b)]
-        step = zip(first, (*self.b, 0.0), reversed(first), strict=True)
-        return tuple([(f0, 3.0 * b - 2.0 * f0 - f1, f0 + f1 - 2.0 * b) for f0, b, f1 in step])
 
 
 EULER = Tableau(1, c=(0.0,), a=((),), b=(1.0,))
@@ -210,7 +182,6 @@ def real_stability(tableau: Tableau) -> float:
 
 
 DIGITS = 50  # of the numbers of Gauss's methods
-NEWTON = 8  # steps that make 50 digits of a guess that has two or three
 _0, HALF, _1 = Fraction(0), Fraction(1, 2), Fraction(1)
 
 
@@ -225,50 +196,31 @@ class Partitioned:
     c: Fractions
 
 
-def gauss(stages: int) -> Partitioned:
-    """Gauss's method of s stages, of order 2 s: collocation at the roots x of Legendre's polynomial P_s.
-
-    With c = (1 + x) / 2 and w = 1 / ((1 - x^2) P_s'(x)^2), a_ij, the integral of Lagrange's polynomial j to c_i, is
-    w_j (c_i + sum over 0 < k < s of P_k(x_j) (P_k+1(x_i) - P_k-1(x_i)) / 2)  (Hairer and Wanner II, section IV.5).
-    """
-    roots = [_root(stages, i) for i in reversed(range(stages))]
-    p, slopes = zip(*[_legendre(stages, x) for x in roots], strict=True)
-    w = [_rounded(1 / ((1 - x * x) * slope**2)) for x, slope in zip(roots, slopes, strict=True)]
-    a = []
-    for x, here in zip(roots, p, strict=True):
-        rises = [(here[k + 1] - here[k - 1]) / 2 for k in range(1, stages)]
-        total = [(1 + x) / 2 + sum([u * v for u, v in zip(there[1:], rises, strict=False)], _0) for there in p]
-        a.append(tuple([_rounded(weight * each) for weight, each in zip(w, total, strict=True)]))
-    rows = tuple(a)
-    return Partitioned(2 * stages, rows, rows, tuple(w), tuple([sum(row, _0) for row in rows]))
+def _gauss(order: int, a: tuple[Fractions, ...], w: Fractions) -> Partitioned:
+    return Partitioned(order, a, a, w, tuple([sum(row, _0) for row in a]))
 
 
-def _legendre(s: int, x: Fraction) -> tuple[list[Fraction], Fraction]:
-    """P_0(x) .. P_s(x), and P_s'(x)."""
-    p = [_1, x]
-    for k in range(1, s):
-        p.append(_rounded(((2 * k + 1) * x * p[k] - k * p[k - 1]) / (k + 1)))
-    return p, s * (x * p[s] - p[s - 1]) / (x * x - 1)
+def _root(n: int) -> Fraction:
+    return Fraction(math.isqrt(n * 10 ** (2 * DIGITS)), 10**DIGITS)
 
 
-def _root(s: int, i: int) -> Fraction:
-    """Root i of P_s, from the largest down, by Newton's method."""
-    x = _rounded(Fraction(math.cos(math.pi * (i + 0.75) / (s + 0.5))))
-    for _ in range(NEWTON):
-        p, slope = _legendre(s, x)
-        x = _rounded(x - p[s] / slope)
-    return x
-
-
-def _rounded(x: Fraction) -> Fraction:
-    return Fraction(round(x * 10**DIGITS), 10**DIGITS)
-
-
+_B4, _R4 = Fraction(1, 4), _root(3) / 6
+_B6, _C6, _R6 = Fraction(5, 36), Fraction(2, 9), _root(15)
+GAUSS4 = _gauss(4, ((_B4, _B4 - _R4), (_B4 + _R4, _B4)), (HALF, HALF))
+GAUSS6 = _gauss(
+    6,
+    (
+        (_B6, _C6 - _R6 / 15, _B6 - _R6 / 30),
+        (_B6 + _R6 / 24, _C6, _B6 - _R6 / 24),
+        (_B6 + _R6 / 30, _C6 + _R6 / 15, _B6),
+    ),
+    (2 * _B6, 2 * _C6, 2 * _B6),
+)
 SYMPLECTIC_EULER = Partitioned(1, a=((_0,),), b=((_1,),), w=(_1,), c=(_0,))
 VERLET = Partitioned(2, a=((_0, _0), (HALF, HALF)), b=((HALF, _0),) * 2, w=(HALF, HALF), c=(_0, _1))
-MIDPOINT = gauss(1)
+MIDPOINT = _gauss(2, ((HALF,),), (_1,))
 PARTITIONED = {"symplectic_euler": SYMPLECTIC_EULER, "verlet": VERLET, "midpoint": MIDPOINT}
-PARTITIONED |= {"gauss4": gauss(2), "gauss6": gauss(3)}
+PARTITIONED |= {"gauss4": GAUSS4, "gauss6": GAUSS6}
 
 
 @dataclass(frozen=True)

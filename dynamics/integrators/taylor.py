@@ -13,6 +13,7 @@ import math
 import operator
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
 
 import cgraph as cg
 from cgraph import Node
@@ -89,7 +90,7 @@ def _wish(order: int) -> list[Statement]:
     def at_start(x: Node, rtol: Node, atol: Node, *terms: Node) -> Values:
         """Under a force that begins at 0 that is 0, too, but not its largest."""
         size = cg.maximum(abs(x), abs(terms[0]))
-        return {"weight": 1.0 / (atol + rtol * cg.where(size, size, _largest(terms)))}
+        return {"weight": 1.0 / (atol + rtol * cg.where(size, size, reduce(cg.maximum, map(abs, terms))))}
 
     def wish(last: Node, before: Node, unit: Node, next_: Node) -> Values:
         both = cg.maximum(math.exp(1.4) * before, math.exp(4.0 + 1.4 * order / (order - 1.0)) * last)
@@ -105,15 +106,6 @@ def _wish(order: int) -> list[Statement]:
         replace(last, inputs=(f"c{order - 1}", "weight"), outputs=("before",)),
         call(wish),
     ]
-
-
-def _largest(c: Sequence[Node]) -> Node:
-    """The largest size, by halves side by side."""
-    sizes = [abs(each) for each in c]
-    while len(sizes) > 1:
-        pairs = zip(sizes[::2], sizes[1::2], strict=False)
-        sizes = [*[cg.maximum(one, other) for one, other in pairs], *sizes[len(sizes) // 2 * 2 :]]
-    return sizes[0]
 
 
 def _arrival(order: int) -> Statement:

@@ -50,7 +50,7 @@ class StepBlock(NamedTuple):
             return states
         with np.errstate(all="ignore"):
             met = values_of(graph, self._inputs(graph, rows, s, states), len(s)).T
-        return np.where((s == 1.0)[:, None], states, met)  # type: ignore[no-any-return]
+        return np.where((s == 1.0)[:, None], states, met)
 
     def _polynomial(self, rows: Indices, s: Array) -> Array:
         """States (k, m), not normalized between the ends."""
@@ -101,7 +101,8 @@ class StepBlock(NamedTuple):
 
     def part(self, which: slice) -> StepBlock:
         """Subset of the steps."""
-        return self._replace(**{name: array[which] for name, array in self._arrays().items()})
+        arrays = {name: array[which] for name, array in self._arrays().items()}
+        return self._replace(**arrays)  # type: ignore[arg-type]
 
     def ending(self, t: float, x: Array) -> StepBlock:
         """The steps, the last of which ends at an instant inside it."""

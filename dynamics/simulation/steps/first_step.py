@@ -69,7 +69,7 @@ def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: 
     after += [If("row", (larger,)), If("due", raised, seldom=True)]
     before = [If("anew", (*found, *_set_out(problem, AT_ONCE if starts else FIRST_LOOK)), seldom=True)]
     first, last = (_of_start(part, {*registers(problem), "farthest"}) for part in (before, after))
-    known = steps.registers | {f"{START}{name}": 1 for name in GIVEN}
+    known = {**steps.registers, **{f"{START}{name}": 1 for name in GIVEN}}
     return replace(steps, registers=lengths_of([*first, *last], known), body=[*first, *steps.body, *last])
 
 

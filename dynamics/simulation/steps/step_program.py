@@ -11,7 +11,7 @@ import numpy as np
 
 from cgraph import Graph
 from cgraph._shared import kept_by_first, memo
-from cgraph.extend import Call, Factor, If, Map, Program, Runner, Statement, runner
+from cgraph.extend import Call, Factor, If, Program, Runner, Statement, runner
 
 from ...integrators import Method, Problem
 from ...integrators.problem import constraint_rates
@@ -67,28 +67,6 @@ class CompiledSteps:
     def factorizations(self) -> int:
         """LU factorizations in a trial of a step."""
         return sum(isinstance(statement, Factor) for statement in self.program.steps.statements())
-
-    @cached_property
-    def prices(self) -> tuple[float, float]:
-        """Operations of the Jacobian and of an LU factorization, the mean of all, in those of the rate; 0 without.
-
-        A factorization of n rows has 2/3 n^3, products, sums and quotients.
-        """
-        steps, jacobian, factors = self.program.steps, 0, list[float]()
-        for each in steps.statements():
-            if isinstance(each, Call | Map) and any(
-                name == "known" or name.startswith("jacobian") for name in each.outputs
-            ):
-                turns = steps.registers[each.inputs[0]] if isinstance(each, Map) else 1
-                jacobian += turns * _operations(each.graph)
-            elif isinstance(each, Factor):
-                factors.append(2.0 / 3.0 * steps.registers[each.pivots] ** 3)
-        one = max(1, _operations(self.program.rate))
-        return (jacobian / one, sum(factors) / len(factors) / one) if factors else (0.0, 0.0)
-
-
-def _operations(graph: Graph) -> int:
-    return sum(bool(node.args) for node in graph.nodes)
 
 
 @kept_by_first
