@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         tangent as tangent,
     )
     from .program.runners.batch_code import LaneCode as LaneCode
+    from .program.statement import with_names as with_names
     from .simplification.identities import shortened as shortened
     from .simplification.ordered_terms import ink as ink
     from .simplification.polynomial import (

@@ -14,7 +14,6 @@ from .problem import (
     quantity as quantity,
     quantity_inputs as quantity_inputs,
     state_arguments as state_arguments,
-    time_derivative as time_derivative,
     total_energy as total_energy,
 )
 from .step import (
@@ -58,27 +57,18 @@ def _symplectic(method: Partitioned | Composition, step: str = "partitioned_step
 
 
 def _taylor_order(rtol: float) -> int:
-    """Jorba and Zou's for a relative tolerance, and two more; the highest where it asks for nothing.
-
-    Theirs is the best where a step costs what its coefficients do. Of small systems the rest costs as much.
-    """
+    """The order of Jorba and Zou for a relative tolerance, and two more, which small systems repay."""
     wanted = 3.0 - 0.5 * math.log(rtol) if 0.0 < rtol < 1.0 else math.inf
     return math.ceil(min(max(wanted, LEAST_ORDER), TAYLOR_ORDER))
 
 
+_taylor = _later("taylor", "taylor_step", order=TAYLOR_ORDER)
 METHODS: dict[str, Method] = {
     **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
     "dop853": runge_kutta(DOP853),
     "rodas": Method(5, _later("rosenbrock", "rodas_step"), adaptive=True),
     "radau": Method(5, _later("radau", "radau_step"), adaptive=True),
-    "taylor": Method(
-        TAYLOR_ORDER,
-        _later("taylor", "taylor_step", order=TAYLOR_ORDER),
-        adaptive=True,
-        finest=2.0**-52,
-        starts=True,
-        order_at=_taylor_order,
-    ),
+    "taylor": Method(TAYLOR_ORDER, _taylor, adaptive=True, finest=2.0**-52, starts=True, order_at=_taylor_order),
     **{name: _symplectic(method) for name, method in PARTITIONED.items()},
     **{name: _symplectic(method, "composed_step") for name, method in COMPOSITIONS.items()},
 }

@@ -82,10 +82,7 @@ def _error(tableau: Tableau, problem: Problem) -> list[Statement]:
 
 
 def _at_limit(tableau: Tableau) -> list[Statement]:
-    """Counts accepted steps beyond the stability limit on the negative real axis (Hairer and Wanner II, section IV.2).
-
-    h |f(x_new) - f(y)| / |x_new - y|, with y the state of the last stage, which like x_new stands at t + h.
-    """
+    """Counts accepted steps with h |f(x_new) - f(y)| / |x_new - y| at the stability limit (Hairer, Wanner II, IV.2)."""
     if tableau.c[-1] != 1.0:
         return []
     stages = len(tableau.b)

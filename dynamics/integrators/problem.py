@@ -64,14 +64,6 @@ class Problem:
         system = self.system
         return system is not None and system.kinematics.quasi is None and not len(system.constraints)
 
-    @property
-    def lengths(self) -> tuple[float, ...]:
-        """Scale of each component of a state in comparisons, see `System.lengths`; of momenta the inverse of qd's."""
-        if self.system is None:
-            return (1.0,) * self.size
-        q, qd = self.system.lengths[: self.nq], self.system.lengths[self.nq :]
-        return (*q, *[1.0 / length if length else 0.0 for length in qd]) if self.momenta else (*q, *qd)
-
     @cached_property
     def timed(self) -> bool:
         """Whether f depends on t."""
@@ -91,10 +83,7 @@ class Problem:
 
 
 def derive(model: Model, bound: Mapping[str, float]) -> Problem:
-    """The problem of a model, with these numbers built in; of the last few, the one that was derived before.
-
-    Raises SingularMassMatrixError for a coordinate without inertia, TypeError for what is no model.
-    """
+    """The problem of a model, with these numbers built in; of the last few, the one that was derived before."""
     model = as_equations(model)
     inputs, system = state_inputs(model), model.system
     if system is None:
@@ -186,11 +175,7 @@ def quantity(
     *,
     constant: bool = False,
 ) -> Node:
-    """A quantity of the state, function(q, qd, t[, p]) or (x, t[, p]), as a node over `quantity_inputs`.
-
-    tau: of a quantity of the applied force besides, function(q, qd, tau, t[, p]).  constant: or a number.
-    Raises TypeError for what is no such function, ValueError for a result that is no node of the state.
-    """
+    """function(q, qd, [tau,] t[, p]) or (x, t[, p]) as a node over `quantity_inputs`; constant: or a number."""
     arguments = state_arguments(problem)
     if tau is None:
         node = call_user_function(what, function, *arguments)

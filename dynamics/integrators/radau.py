@@ -1,9 +1,7 @@
 """Radau IIA of order 5: three implicit stages, solved by simplified Newton with the exact Jacobian, for stiff systems.
 
-Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.8. The stages' increments Z are the rows of
-Z = T W; in W the Newton equations fall apart into one real system of the size of the state, (r/h - J), and a complex
-one, (c/h - J), here as a real one of twice the size. While the iteration converges fast the Jacobian stays, and while
-steps are alike the factors do.
+Hairer and Wanner II, section IV.8. The stages' increments Z are the rows of Z = T W; in W the Newton equations fall
+apart into a real system of the size of the state, (r/h - J), and a complex one, (c/h - J), here real of twice the size.
 """
 
 from __future__ import annotations
@@ -118,10 +116,7 @@ def radau_step(problem: Problem) -> Step:
 
 @call
 def renewed(current: Node, accepted: Node, slow: Node, h_factored: Node) -> Values:
-    """Whether the Jacobian is evaluated: not if it is that of this state, or the last step converged fast by it.
-
-    After a trial by that of another state it is, and without an error to choose steps by always.
-    """
+    """Whether the Jacobian is evaluated: not if it is that of this state, or the last step converged fast by it."""
     fast = accepted * cg.equal(slow, 0.0) * cg.not_equal(h_factored, 0.0)
     result = (1.0 - current) * (1.0 - fast)
     return {"renewed": result, "current": cg.maximum(current, result)}
@@ -190,10 +185,7 @@ def _guess(z: str, c: float) -> Statement:
 
 @call
 def begin(rtol: Node) -> Values:
-    """Newton's iteration starts; it ends where a change is small beside the tolerance of the step.
-
-    Without a tolerance, where the step cannot be halved: beside rounding, after as many turns as it takes.
-    """
+    """Newton's iteration starts: until changes are small beside the tolerance; without one, beside rounding."""
     newton = cg.maximum(10.0 * EPSILON / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
     return {
         "going": 1.0,
@@ -230,10 +222,7 @@ def _change(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node, least: Nod
 
 
 def _judged(numbers: int) -> Call:
-    """Whether Newton's iteration goes on, and whether it has converged.
-
-    One that will not come to the tolerance in time has not; beside rounding, one that comes no nearer has.
-    """
+    """Whether Newton's iteration goes on, and whether it has converged; beside rounding, if it comes no nearer."""
 
     def judged(change: Node, change_old: Node, turns: Node, *others: Node) -> Values:
         stalled, exact, newton, evaluations = others
@@ -261,10 +250,7 @@ def _judged(numbers: int) -> Call:
 
 
 def _estimate(problem: Problem) -> list[Statement]:
-    """The error as the real system filters it; filtered twice when the first says no (section IV.8, eq. 8.19 and 8.20).
-
-    Where Newton's iteration did not converge, an error that halves the step.
-    """
+    """The error as the real system filters it, twice if the first says no (eq. 8.20); HALVES without convergence."""
 
     def filtered(rate: str) -> list[Statement]:
         right = each(lambda rate, h, *z: {"error_vector": rate + weighted(z, _ERROR) / h}, rate, "h", *Z)

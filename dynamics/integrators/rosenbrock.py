@@ -1,8 +1,7 @@
 """Rosenbrock methods: each stage one linear equation with the exact Jacobian, for stiff systems.
 
 (I / (gamma h) - J) U_i = f(t + c_i h, x + sum_j a_ij U_j) + sum_j (C_ij / h) U_j + h d_i df/dt. The last stages start
-where the one before arrived, so that the step arrives one U further, and that U is the estimate of its error. The
-matrix has the step in it, and the order needs the Jacobian of the state: each trial factors, and each state evaluates.
+where the one before arrived, so that the step arrives one U further, and that U is the estimate of its error.
 """
 
 from __future__ import annotations

@@ -35,15 +35,13 @@ STATES = ("x", "x_new", "atol")
 SHARED = (*STATES, *"t h p rtol leap next end evaluations error at_limit accepted".split())
 Values = Mapping[str, Node | float | Sequence[Node | float]]
 Rule = Callable[..., Values]
+Formula = tuple[Graph, tuple[str, ...], tuple[str, ...]]
 Weights = Sequence[float | Fraction]
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of a method, from x at t to x_new, as statements over registers; docs/extending.md has an example.
-
-    Each has registers x (m), x_new (m), t, h and p, the values of the problem's parameters, and may set others.
-    """
+    """One step of a method, from registers x (m), t, h and p to x_new (m); docs/extending.md tells of each field."""
 
     lengths: Mapping[str, int] = field(default_factory=dict)  # of registers that a `Call` of several sets
     body: Sequence[Statement] = ()  # x_new of x, t, h, p and what comes before
@@ -60,8 +58,11 @@ class Step:
 
     @property
     def derived(self) -> list[Statement]:
-        """The statements of a step whose derivatives are taken, from x to the new x."""
-        return arriving([*self.rates, *self.prepare, *self.body, *self.kept])
+        """The statements from x to the new x, whose derivatives are taken."""
+        *before, last = (*self.rates, *self.prepare, *self.body, *self.kept)
+        if isinstance(last, Map | Call) and last.outputs == ("x_new",):
+            return [*before, replace(last, outputs=("x",))]
+        return [*before, last, copied("x_new", "x")]
 
     @property
     def iterates(self) -> bool:
@@ -69,19 +70,8 @@ class Step:
         return any(isinstance(each, While | FixedPoint) for each in (*self.start, *self.derived))
 
 
-def arriving(statements: Sequence[Statement]) -> list[Statement]:
-    """The statements with x_new as the new x: where the last one makes it, written there, else copied."""
-    *before, last = statements
-    if isinstance(last, Map | Call) and last.outputs == ("x_new",):
-        return [*before, replace(last, outputs=("x",))]
-    return [*statements, copied("x_new", "x")]
-
-
 def with_registers(step: Step, own: Mapping[str, int], *more: Statement) -> dict[str, int]:
-    """Lengths of all registers: those of what wraps a step, and its own.  more: statements after its body.
-
-    Raises ValueError where one name has two meanings, and for a step that does not make x_new of x.
-    """
+    """Lengths of all registers: those of what wraps a step, and its own.  more: statements after its body."""
     every = [*step.start, *step.rates, *step.prepare, *step.body, *more, *step.kept]
     written = effects([*step.rates, *step.prepare, *step.body, *step.kept])[1]
     if "x_new" not in written or "x" in written:
@@ -100,12 +90,10 @@ def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:
 
 
 def call(rule: Rule, *reads: str, **lengths: int) -> Call:
-    """Statement that sets registers by a rule of others.
+    """Statement that sets registers by a rule of others: a function of nodes that gives {register: node}.
 
-    rule: a function of nodes, whose parameters are the registers that it reads (without an underscore at the end, where
-    the name is one of Python's), and that gives {register: node} of those that it sets.  reads: these registers, where
-    their names are others; one that no result depends on, such as by a weight of 0, is left out.  lengths: of those
-    that are lists of several numbers; results may be such lists as well.
+    Its parameters are the registers that it reads (an underscore at the end is dropped), unless `reads` names them; of
+    these, one that no result depends on is left out.  lengths: of those that are lists of several numbers.
 
     >>> later = call(lambda t, h: {"t_new": t + h})
     >>> later.inputs, later.outputs
@@ -124,9 +112,7 @@ def total(rule: Rule, *reads: str) -> Sum:
     return Sum(*_formula(rule, reads, {}))
 
 
-def _formula(
-    rule: Rule, reads: tuple[str, ...], lengths: Mapping[str, int]
-) -> tuple[Graph, tuple[str, ...], tuple[str, ...]]:
+def _formula(rule: Rule, reads: tuple[str, ...], lengths: Mapping[str, int]) -> Formula:
     """The graph of a rule, and the registers that it reads and sets."""
     names = reads or tuple([name.rstrip("_") for name in inspect.signature(rule).parameters])
     values: list[Any] = [
@@ -146,11 +132,7 @@ def _end_to_end(values: Iterable[Any]) -> list[Any]:
 
 
 def lengths_of(statements: Iterable[Statement], known: Mapping[str, int]) -> dict[str, int]:
-    """Lengths of the registers that statements set, as far as these and those that are known tell.
-
-    Component by component a result is as long as what it is made of. The numbers of a call are one for each register,
-    or all of the only one that is not known. Pivots are as many as a matrix has rows.
-    """
+    """Lengths of the registers that statements set, as far as these and those that are known tell."""
     lengths = dict(known)
     for statement in _inside(statements):
         told: dict[str, int] = {}
@@ -202,12 +184,9 @@ def identity(m: int) -> Call:
 
 def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:
     """The sum of weight * node, without those of weight 0."""
-    result: Node | None = None
-    for weight, node in zip(weights, nodes, strict=True):
-        if weight:
-            term = node if weight == 1.0 else weight * node
-            result = term if result is None else result + term
-    return cg.constant(0.0) if result is None else result
+    pairs = [(weight, node) for weight, node in zip(weights, nodes, strict=True) if weight]
+    terms = [node if weight == 1.0 else weight * node for weight, node in pairs]
+    return reduce(operator.add, terms) if terms else cg.constant(0.0)
 
 
 def numbered(register: str, count: int, first: int = 0) -> list[str]:

@@ -1,14 +1,10 @@
 """Methods, and what repeats their steps: of equal lengths, or chosen ones, tried until the error is within tolerance.
 
 A pass of chosen steps is a trial of one, from t to t_new = t + h exactly, of the size `tried`. `anew` is 1 when a run
-begins, which sets registers to 0 that a step hands on to the next. `search` is positive while a first step is looked
-for (see `simulation.steps.first_step`): a trial then is none of the run, and no `row` of its record. `due` is 1 after a
-trial by which sizes that make up atol are to be looked at, if it is `sized` by them.
-
-A force that jumps may be missed for a share `jump` of the `longest` of the last steps: what its mean rate would make in
-that time counts into the `scale` of a component by `leap`, rtol times that time over h. The longest step is forgotten
-by the share by which rates change, so that a pole stays one. After a step in which nothing moved the next is at most
-`still`. docs/design.md says why.
+begins, `search` positive while a first step is looked for (see `simulation.steps.first_step`): a trial then is no `row`
+of the record. `due` is 1 after a trial by which sizes that make up atol are to be looked at, if it is `sized` by them.
+What a force that jumps may be missed by is `leap`, for a share `jump` of the `longest` of the last steps; after a step
+in which nothing moved the next is at most `still`: docs/design.md says why.
 """
 
 from __future__ import annotations
@@ -40,18 +36,13 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 
 @dataclass(frozen=True)
 class Method:
-    """An integrator: what `dyn.METHODS` holds, and all that a simulation knows of a method.
-
-    starts: whether steps need no search for the first, and no limit by the one before, since each is at most what the
-    derivatives at its start allow: `prepare`, which comes before every trial, makes `next` no larger. After a trial
-    that was too long all begins again, with `start`.
-    """
+    """An integrator: what `dyn.METHODS` holds, and all that a simulation knows of a method."""
 
     order: int  # p, where the error of a run falls as h^p
     step: Callable[..., Step]  # of a problem; with order_at of a problem and an order
     adaptive: bool = False  # whether a run chooses its steps by the estimate of their error
     finest: float = SUM_ROUNDING  # relative tolerance below which a step's own rounding is larger
-    starts: bool = False
+    starts: bool = False  # whether `prepare` limits `next`: no first step is searched for, and rejection starts anew
     order_at: Callable[[float], int] | None = None  # the order for a relative tolerance, at most `order`
 
     def at(self, rtol: float) -> Method:
@@ -59,10 +50,7 @@ class Method:
         return self if self.order_at is None else _of_order(self, self.order_at(rtol))
 
     def program(self, problem: Problem, dense: bool) -> Program:
-        """The steps of a run, one after another; dense: with dense output where they are chosen.
-
-        Raises ValueError for a method that the model has not, and for a step that lacks what the run needs.
-        """
+        """The steps of a run, one after another; dense: with dense output where they are chosen."""
         step = self.step(problem)
         if not self.adaptive:
             return equal(step, problem)
@@ -90,21 +78,12 @@ def equal_registers(problem: Problem) -> dict[str, int]:
 def equal(step: Step, problem: Problem) -> Program:
     """Equal steps: one step a pass, of a length that is given, over and over."""
     lengths = with_registers(step, equal_registers(problem))
-    made = float(rate_calls(problem, step.rates, step.prepare, step.body))
-
-    def ended(start: Node, count: Node, h: Node, evaluations: Node) -> Values:
-        """The next time, computed from the start without drift."""
-        return {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": evaluations + made}
-
-    def failed(nonfinite: Node, failed: Node, *singular: Node) -> Values:
-        """Of what goes on, an inertia that is negative says nothing."""
-        bad = nonfinite + failed
-        kept = {"singular": cg.where(bad, singular[0], 0.0)} if singular else {}
-        return {"nonfinite": bad, step.failed: 0.0, **kept}
-
-    body = [*step.derived, call(ended), nonfinite("nonfinite", "x")]
+    made = count(rate_calls(problem, step.rates, step.prepare, step.body))
+    # the next time is computed from the start, without drift
+    time = call(lambda start, count, h: {"t": start + (count + 1.0) * h, "count": count + 1.0})
+    body = [*step.derived, time, made, nonfinite("nonfinite", "x")]
     if step.failed:
-        body.append(call(failed, "nonfinite", step.failed, *(["singular"] if "singular" in lengths else [])))
+        body.append(call(lambda n, failed: {"nonfinite": n + failed, step.failed: 0.0}, "nonfinite", step.failed))
     if step.start:
         body.insert(0, first_pass(*step.start))
         lengths["fresh"] = 1
@@ -122,10 +101,7 @@ def registers(problem: Problem) -> dict[str, int]:
 
 @call
 def trial(t: Node, next_: Node, max_step: Node, end: Node, rtol: Node, jump: Node, longest: Node) -> Values:
-    """The step to try: `next`, or what is left; of a little more than one step, half, so that no sliver remains.
-
-    h = t_new - t, so that the clock and the state make the same step.
-    """
+    """The step to try: `next`, or what is left; of a little more than one step, half, so that no sliver remains."""
     left, most = abs(end - t), cg.minimum(next_, max_step)
     tried = cg.where(most >= left, left, cg.where(2.0 * most > left, 0.5 * left, most))
     t_new = cg.where(most >= left, end, t + cg.where(end > t, tried, -tried))
@@ -139,11 +115,7 @@ def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
 
 
 def control(more: int) -> Call:
-    """Call that accepts a trial or not, by its estimate.  more: evaluations of the rate in a trial.
-
-    A NaN is an error beyond measure. A step below the resolution of t, or of the run, is not accepted whatever its
-    error: only one that ends the run may be so short.
-    """
+    """Call that accepts a trial or not, by its estimate; NaN is an error.  more: evaluations of the rate in a trial."""
     names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen h"
 
     def judged(*values: Node) -> Values:
@@ -169,10 +141,7 @@ def control(more: int) -> Call:
 
 
 def accept_step(order: int, *after: Statement, starts: bool) -> If:
-    """An accepted step becomes the state.
-
-    order: of the step's size in the estimate.  after: what the method does besides, with x still the old state.
-    """
+    """An accepted step becomes the state.  after: what the method does besides, with x still the old state."""
 
     def grown(error: Node, error_old: Node, tried: Node, next_: Node, largest: Node) -> Values:
         growth = SAFETY * error ** -(1.0 / order - 0.75 * MEMORY) * cg.maximum(error_old, 1e-4) ** MEMORY
@@ -269,10 +238,7 @@ def _hermite(problem: Problem) -> list[Statement]:
 
 
 def measured(error: str, m: int) -> list[Statement]:
-    """Register `error`: the root mean square over the state of the register's (error / scale).
-
-    NaN where x_new is not finite: its scale would hide any error.
-    """
+    """Register `error`: the root mean square of the register's (error / scale); NaN where x_new is not finite."""
 
     def square(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node, e: Node) -> Values:
         part = e / scale(x, x_new, rtol, atol, leap)

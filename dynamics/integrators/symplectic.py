@@ -3,12 +3,9 @@
 Stages Q_i = q + h sum_j a_ij V_j and P_i = p + h sum_j b_ij F(Q_j, V_j), with the velocity V_i that belongs to P_i at
 Q_i; a step adds h sum_i w_i V_i to q and h sum_i w_i F_i to p (Hairer, Lubich and Wanner, sections II.2 and VI.4). The
 stages are solved for by iterating on the velocities until they no longer come nearer, each turn a Newton step of
-V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sums over many steps are compensated, and
-numbers of the method are as exact as two float64: a method is only symplectic as exactly as w_i b_ij + w_j a_ji =
-w_i w_j, and what is missing adds up to a drift of the energy (Hairer, McLachlan and Razakarivony, BIT 2008).
-
-Quasi-velocities have no such momenta, and constraints hold them: methods of Gauss, and compositions of `midpoint`, step
-the state (q, qd) there, as that of a system of first order.
+V_i -> P_i(V_i). Sums over many steps are compensated, and numbers of the method are as exact as two float64, since what
+w_i b_ij + w_j a_ji = w_i w_j misses is a drift of the energy (Hairer, McLachlan and Razakarivony, BIT 2008). Where
+there are no such momenta, methods of Gauss step the state (q, qd), as that of a system of first order.
 """
 
 from __future__ import annotations
@@ -60,25 +57,20 @@ class Mechanics(NamedTuple):
 
     momentum: Graph  # (q, qd) -> p
     force: Graph  # (q, qd) -> p_dot = dL/dq + tau + forces - damping qd
-    velocity: Graph  # (q, qd, p, t, parameters, singular) -> qd, nearer to the velocity that belongs to p: a step of
-    # Newton, exact when K is quadratic in qd; and singular, if it was 0: 0 where M is positive definite, else
-    # 1 + the index of a coordinate without inertia
+    velocity: (
+        Graph  # (q, qd, p) -> qd, nearer to the velocity that belongs to p: a step of Newton, exact for quadratic K
+    )
     quadratic: bool  # the momenta are linear in the velocities: M does not depend on them
     separable: bool  # p = M qd with a constant M, and the forces do not depend on the velocities
 
 
 @kept_by_first
 def mechanics(problem: Problem) -> Mechanics:
-    """The graphs of momenta of a problem.
-
-    Raises ValueError for a system that has none, of first order, with quasi-velocities or with constraints;
-    SingularMassMatrixError for a coordinate without inertia.
-    """
+    """The graphs of momenta of a problem. Raises ValueError or SingularMassMatrixError where they are none."""
     system = problem.system
     if system is None or not problem.canonical:
         raise ValueError(NO_MOMENTA)
-    build, n, inertia = Builder(), system.n, (system.lagrangian, system.qd)
-    p, (before,) = new_variables("p", n, system.parameters), new_variables("singular", 1, system.parameters)
+    build, n, p = Builder(), system.n, new_variables("p", system.n, system.parameters)
     bars = cotangents({system.lagrangian: cg.constant(1.0)}, [*system.q, *system.qd], build)
     slopes, momenta = bars[:n], bars[n:]
     with building(build):
@@ -86,23 +78,18 @@ def mechanics(problem: Problem) -> Mechanics:
         force = [slope + tau + applied - damping * qd for slope, tau, applied, damping, qd in parts]
         missing = [wanted - here for wanted, here in zip(p, momenta, strict=True)]
     try:
-        *steps, info = solve_nodes(*inertia, missing, build, check=True)
+        steps = solve_nodes(system.lagrangian, system.qd, missing, build)
     except SingularError as error:
-        if not error.pivot:
-            name = system.coordinates[error.index]
-            raise SingularMassMatrixError(
-                f"the mass matrix is singular: coordinate {name!r} has no inertia, or none that others do not share, "
-                "and a method that steps momenta needs it"
-            ) from None
-        steps, info = solve_nodes(*inertia, missing, build), cg.constant(0.0)  # a negative constant divides as well
+        raise SingularMassMatrixError(
+            f"the mass matrix is singular: coordinate {system.coordinates[error.index]!r} has no inertia, or none that "
+            "others do not share, and a method that steps momenta needs it"
+        ) from None
     with building(build):
         velocity = [qd + step for qd, step in zip(system.qd, steps, strict=True)]
-        singular = cg.where(before, before, info)
 
-    def graph(inputs: list[Node], outputs: list[Node], *last: Node) -> Graph:
-        whole = Graph([*inputs, *last, *system.tau, *system.extra_inputs], {f"{k}": y for k, y in enumerate(outputs)})
-        bound = problem.bind([str(node.name) for node in (*inputs, *last)], whole)
-        return Graph([node for node in bound.inputs if node not in last] + list(last), bound.outputs)
+    def graph(inputs: list[Node], outputs: list[Node]) -> Graph:
+        whole = Graph([*inputs, *system.tau, *system.extra_inputs], {f"{k}": node for k, node in enumerate(outputs)})
+        return problem.bind([str(node.name) for node in inputs], whole)
 
     state = [*system.q, *system.qd]
     momentum, rate = graph(state, momenta), graph(state, force)
@@ -110,8 +97,7 @@ def mechanics(problem: Problem) -> Mechanics:
     quadratic = not reaches(mass_matrix, system.qd)
     free = not reaches(rate.outputs.values(), system.qd)
     constant = not reaches([*mass_matrix, *momentum.outputs.values()], [*system.q, system.t])
-    solved = graph([*state, *p], [*velocity, singular], before)
-    return Mechanics(momentum, rate, solved, quadratic, free and constant and quadratic)
+    return Mechanics(momentum, rate, graph([*state, *p], velocity), quadratic, free and constant and quadratic)
 
 
 def composed_step(composition: Composition, problem: Problem) -> Step:
@@ -146,7 +132,7 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
         return Call(graphs.force, (q, v, t, "p"), (target,))
 
     def velocity(q: str, v: str, momentum: str, t: str, target: str) -> Call:
-        return Call(graphs.velocity, (q, v, momentum, t, "p", "singular"), (target, "singular"))
+        return Call(graphs.velocity, (q, v, momentum, t, "p"), (target,))
 
     settled = velocity("q", "v", "momentum", "later", "v")
     if graphs.separable and method in (SYMPLECTIC_EULER, VERLET):
@@ -194,8 +180,8 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
 
 def _step(method: Partitioned, lengths: dict[str, int], start: list[Statement], body: list[Statement]) -> Step:
     fixed = [*numbered("change", len(method.w)), *numbered("speed", len(method.w))]
-    fixed += "q_rounding momentum_rounding singular failed failures going turns change_old".split()
-    return Step({**lengths, "failed": 1, "singular": 1}, body, start=start, fixed=tuple(fixed), failed="failures")
+    fixed += "q_rounding momentum_rounding failed failures going turns change_old".split()
+    return Step({**lengths, "failed": 1}, body, start=start, fixed=tuple(fixed), failed="failures")
 
 
 def _parted(sizes: dict[str, int]) -> Call:
@@ -257,10 +243,7 @@ def _added(base: str, slope: str, weights: Fractions) -> Map:
 
 
 def _explicit(method: Partitioned, force: Call, velocity: Sequence[Statement], later: Call) -> list[Statement]:
-    """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration.
-
-    force, velocity: registers F0 and V0 at q and the momentum, at t.  later: F0 at a later time.
-    """
+    """A step without iteration, by F0 and V0 at q and the momentum, at t, and F0 later; where M is constant."""
     half = method is VERLET
     kick = advanced("momentum", (HALF if half else Fraction(1),), "momentum", "F")
     body = [force, kick, *velocity, _added("q", "V", (Fraction(1),)), stage_time("later", 1.0)]

@@ -17,11 +17,9 @@ Fractions = tuple[Fraction, ...]
 
 @dataclass(frozen=True)
 class Tableau:
-    """The numbers of an explicit Runge-Kutta method of s stages.
+    """The numbers of an explicit Runge-Kutta method; with weights of an error estimate it chooses its steps.
 
-    Stage k is taken at t + c_k h and x + h sum_j a_kj slope_j; the step adds h sum_k b_k slope_k. A tableau with
-    weights of an error estimate is an embedded method, which chooses its steps.
-
+    Stage k is taken at t + c_k h and x + h sum_j a_kj slope_j; the step adds h sum_k b_k slope_k.
     """
 
     order: int
@@ -141,8 +139,7 @@ def _row(weights: _Sparse, length: int) -> RowOfWeights:
 def _dense() -> tuple[RowOfWeights, ...]:
     """Weights of the slopes in the powers of s, from the nested form that the program evaluates.
 
-    x + s (F0 + (1 - s) (F1 + s (F2 + (1 - s) (F3 + s (F4 + (1 - s) (F5 + s F6)))))), with F0 the whole step, F1 and F2
-    of Hermite's kind and the other F from the table.
+    x + s (F0 + (1 - s) (F1 + s (F2 + (1 - s) (F3 + s (F4 + (1 - s) (F5 + s F6)))))), with F3 to F6 from the table.
     """
     whole, first, last = np.array(_row(_B, 16)), np.eye(16)[0], np.eye(16)[12]
     parts = [whole, first - whole, 2.0 * whole - first - last, *(np.array(_row(weights, 16)) for weights in _D)]
@@ -207,15 +204,12 @@ def _root(n: int) -> Fraction:
 _B4, _R4 = Fraction(1, 4), _root(3) / 6
 _B6, _C6, _R6 = Fraction(5, 36), Fraction(2, 9), _root(15)
 GAUSS4 = _gauss(4, ((_B4, _B4 - _R4), (_B4 + _R4, _B4)), (HALF, HALF))
-GAUSS6 = _gauss(
-    6,
-    (
-        (_B6, _C6 - _R6 / 15, _B6 - _R6 / 30),
-        (_B6 + _R6 / 24, _C6, _B6 - _R6 / 24),
-        (_B6 + _R6 / 30, _C6 + _R6 / 15, _B6),
-    ),
-    (2 * _B6, 2 * _C6, 2 * _B6),
+_A6 = (
+    (_B6, _C6 - _R6 / 15, _B6 - _R6 / 30),
+    (_B6 + _R6 / 24, _C6, _B6 - _R6 / 24),
+    (_B6 + _R6 / 30, _C6 + _R6 / 15, _B6),
 )
+GAUSS6 = _gauss(6, _A6, (2 * _B6, 2 * _C6, 2 * _B6))
 SYMPLECTIC_EULER = Partitioned(1, a=((_0,),), b=((_1,),), w=(_1,), c=(_0,))
 VERLET = Partitioned(2, a=((_0, _0), (HALF, HALF)), b=((HALF, _0),) * 2, w=(HALF, HALF), c=(_0, _1))
 MIDPOINT = _gauss(2, ((HALF,),), (_1,))
@@ -225,12 +219,7 @@ PARTITIONED |= {"gauss4": GAUSS4, "gauss6": GAUSS6}
 
 @dataclass(frozen=True)
 class Composition:
-    """A method of higher order: steps of a symmetric one of order two, of gamma_1 h, gamma_2 h, .., in turn.
-
-    The base is `verlet` where it is explicit (kinetic energy of the velocities alone, forces of the coordinates), and
-    else `midpoint`, which takes any Lagrangian and systems of first order. A palindrome of numbers makes a symmetric
-    method, and steps of symplectic maps are symplectic.
-    """
+    """Steps of a symmetric method of order two, `verlet` or else `midpoint`, of gamma_1 h, gamma_2 h, .., in turn."""
 
     order: int
     steps: tuple[float, ...]  # gamma_1, gamma_2, .., which add up to 1

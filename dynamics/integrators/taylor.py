@@ -1,9 +1,8 @@
 """Taylor's method: steps by the Taylor series of the solution, of an order by the tolerance.
 
 Order and step follow Jorba and Zou, Experimental Mathematics 14 (2005) 99: the step at which the last two terms are as
-small as the tolerance, and order -log(rtol) / 2 + 3, two more than theirs. Coefficients are of the time in units of the
-step before, so that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where
-the derivative of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
+small as the tolerance. Coefficients are of the time in units of the step before, so that they neither overflow nor
+depend on the unit of time. What a step missed is seen at its end, where the derivative has to be the rate.
 """
 
 from __future__ import annotations
@@ -26,9 +25,7 @@ from .step import Step, Values, call, compensated, count, each, numbered, stage_
 
 MOST_OPERATIONS = 300_000  # of a series, before folding: as many take 20 s to compile
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
-# Units in a step, inverse: a shorter one is tried again in a unit of its own, for what starts at 0 is measured by its
-# first change, which is that of a whole unit.
-APART = 3.0
+APART = 3.0  # units in a step, inverse: a shorter one is tried again in a unit of its own, by its own first change
 SHORTEST = 2.0**-10  # units: the first try where terms say nothing, as of what stays at 0, or overflow
 
 
@@ -77,11 +74,7 @@ def _jets(problem: Problem) -> Jets:
 
 
 def _wish(order: int) -> list[Statement]:
-    """Register `next`: at most the step at which the last two terms are within the tolerance.
-
-    That is y^(-1 / 2k) units, y the sum of squares of c_k over the tolerance, with a safety factor. Both are taken as a
-    power of the higher order alone, which is the same for a step as long as the one before, and takes half the time.
-    """
+    """Register `next`: at most y^(-1 / 2k) units, y the squares of the last terms over the tolerance, k the order."""
 
     def later(x: Node, rtol: Node, atol: Node, first: Node) -> Values:
         """What starts at 0 is as large as its first change."""
@@ -130,10 +123,7 @@ def _polynomial(c: Sequence[Node], s: Node) -> Node:
 
 
 def _checked(m: int, order: int) -> list[Statement]:
-    """Register `error`: what the step misses by its defect, the difference of rate and derivative at its end.
-
-    One that has to be tried again misses a tolerance more.
-    """
+    """Register `error`: the defect, the difference of rate and derivative at the end; more for what is tried again."""
 
     def square(slope: Node, rate: Node, x: Node, x_new: Node, rtol: Node, atol: Node, h: Node) -> Values:
         scale = atol + cg.maximum(rtol, CHECKED) * cg.maximum(abs(x), abs(x_new)) + CHECKED * abs(slope)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +15,6 @@ from cgraph import Graph
 from cgraph._shared import Array, kept_by_first, real_array
 
 from .row_values import converted, values_of
-
-if TYPE_CHECKING:
-    from cgraph import Compiled
 
 UNIT = 2.0**-53  # relative error of one rounding
 
@@ -118,7 +115,7 @@ def _tangent(graph: Graph, m: int) -> Graph:
 
 
 @kept_by_first
-def _compiled(rate: Graph) -> Compiled:
+def _compiled(rate: Graph) -> cg.Compiled:
     """The rate, for states at many times."""
     return cg.compile(rate)
 
@@ -147,10 +144,7 @@ def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float], ins
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The state at any time of a run that began with x at t0 and made these steps; the first nq numbers of it are q.
-
-    velocities: qd of states (q, p), see Problem.
-    """
+    """The state at any time of a run from x at t0; the first nq numbers are q, velocities gives qd of (q, p)."""
 
     t0: float
     x: Array

@@ -3,8 +3,7 @@
 Before its own first trial a run looks ahead by Euler's steps, where it is `sized`, for the tolerance that goes with the
 sizes of the state to come; tries steps with a tolerance that anything meets, each whole (`search` = 3) and as two
 halves (2, 1), until these confirm it; and so on in `ROUNDS`, as long as the look ahead went much farther than the step.
-A method that `starts` by itself has neither: its first trial is as long as it wishes, and sizes are looked at as soon
-as there are others than the start's.
+A method that `starts` has neither.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Node
+from cgraph._shared import with_names
 from cgraph.extend import STATEMENTS, Call, If, Program, Statement, While, copied
 
 from ...integrators import Problem
@@ -66,6 +66,7 @@ def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: 
         after.append(If("search", _turn(problem.size, order), seldom=True))
     later = call(lambda seen: {"seen": 2.0 * seen, "due": 0.0})
     raised = (*tolerance, *_at_rest(kinds), copied("tolerance", "atol"), later)
+    larger = each(lambda size, x: {"size": cg.maximum(size, _size(x))})
     after += [If("row", (larger,)), If("due", raised, seldom=True)]
     before = [If("anew", (*found, *_set_out(problem, AT_ONCE if starts else FIRST_LOOK)), seldom=True)]
     first, last = (_of_start(part, {*registers(problem), "farthest"}) for part in (before, after))
@@ -75,29 +76,18 @@ def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: 
 
 def _of_start(statements: Sequence[Statement], shared: Collection[str]) -> tuple[Statement, ...]:
     """The statements, whose registers but the shared ones are those of the start."""
-
-    def named(names: str | Sequence[str]) -> str | tuple[str, ...]:
-        if isinstance(names, str):
-            return names if names in shared else f"{START}{names}"
-        return tuple([str(named(name)) for name in names])
-
     result = []
     for statement in statements:
         row = STATEMENTS[type(statement)]
-        changed: dict[str, Any] = {name: named(getattr(statement, name)) for name in (*row.reads, *row.writes)}
-        changed |= {body: _of_start(getattr(statement, body), shared) for body in row.bodies}
-        result.append(replace(statement, **changed))  # type: ignore[type-var]
+        bodies: dict[str, Any] = {body: _of_start(getattr(statement, body), shared) for body in row.bodies}
+        fields = dict.fromkeys([*row.reads, *row.writes])
+        named = with_names(statement, fields, lambda name: name if name in shared else f"{START}{name}")
+        result.append(replace(named, **bodies))  # type: ignore[type-var]
     return tuple(result)
 
 
 def _size(x: Node) -> Node:
     return cg.where(abs(x) < math.inf, abs(x), 0.0)
-
-
-@each
-def larger(size: Node, x: Node) -> Values:
-    """The largest size so far."""
-    return {"size": cg.maximum(size, _size(x))}
 
 
 def _rate(problem: Problem, x: str, t: str, target: str) -> Call:
@@ -106,11 +96,7 @@ def _rate(problem: Problem, x: str, t: str, target: str) -> Call:
 
 
 def _tolerance(kinds: StateKinds) -> tuple[Statement, ...]:
-    """Register `tolerance`, in the units of the states, by the sizes so far.
-
-    rtol times the largest value that the component, or another of its group, has had, or a ten-thousandth of the
-    largest of its kind, coordinates or velocities, angles and lengths compared by their `lengths`.
-    """
+    """Register `tolerance` by the sizes so far: of the component or its group, or OTHERS of the largest of its kind."""
 
     def by_sizes(relative: Node, size: Node, kind: Node) -> Values:
         return {"tolerance": cg.maximum(relative * cg.maximum(size, OTHERS * kind), SMALLEST_ATOL)}
@@ -120,12 +106,7 @@ def _tolerance(kinds: StateKinds) -> tuple[Statement, ...]:
 
 
 def _at_rest(kinds: StateKinds) -> list[Statement]:
-    """Raise the tolerance of velocities that, in a mean step of the run so far, do not move any coordinate.
-
-    Of a body that rests in contact, velocities are what the rounding of large forces leaves, and no accuracy can be
-    asked of them: steps by their sizes would have to be ever shorter. A velocity that is off by rtol times the
-    coordinate over the length of the run moves it by no more than its tolerance.
-    """
+    """Raise the tolerance of velocities that in a mean step so far do not move any coordinate: they may be rounding."""
 
     def still(resting: Node, kind: Node, mean: Node, coordinate: Node, relative: Node, length: Node) -> Values:
         rests = (kind > 0.0) * (mean > 0.0) * (kind * mean <= STILL * coordinate)
@@ -145,12 +126,14 @@ def _at_rest(kinds: StateKinds) -> list[Statement]:
 def begin(t: Node, t_end: Node, first: Node, longest_step: Node) -> Values:
     """What a run begins with."""
     length = abs(t_end - t)
+    h_first = LEAP * cg.minimum(length, longest_step)
     return {
         "t0": t,
         "length": length,
         "toward": cg.where(t_end > t, 1.0, -1.0),
         "least": cg.minimum(length, cg.maximum(2.0 * RESOLUTION * abs(t), math.ulp(0.0))),
-        "h_look": cg.where(first, first, LEAP * cg.minimum(length, longest_step)),
+        "h_first": h_first,
+        "h_look": cg.where(first, first, h_first),
         "look": 1.0,
         **dict.fromkeys("rounds begins jumps reach".split(), 0.0),
     }
@@ -166,26 +149,20 @@ def _jump(problem: Problem, kinds: StateKinds) -> list[Statement]:
     body: list[Statement] = [copied("rate_start", "rate_look")]
     if not problem.timed:
         return body
-    once = call(lambda t0, toward, instant: {"t_ahead": t0 + toward * (1.0 * instant)})
-    twice = call(lambda t0, toward, instant: {"t_ahead": t0 + toward * (2.0 * instant)})
-    body += [once, _rate(problem, "x_start", "t_ahead", "rate_ahead")]
-    body += [twice, _rate(problem, "x_start", "t_ahead", "rate_before")]
+    for k, target in ((1.0, "rate_ahead"), (2.0, "rate_before")):
+        ahead = call(lambda t, to, dt, k=k: {"t_ahead": t + to * (k * dt)}, "t0", "toward", "instant")
+        body += [ahead, _rate(problem, "x_start", "t_ahead", target)]
     body += [Call(kinds.largest, ("rate_start",), ("kind",)), Call(kinds.largest, ("rate_ahead",), ("kind_ahead",))]
     return [*body, total(jumps), If("jumps", (copied("rate_ahead", "rate_look"),))]
 
 
 def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -> tuple[Statement, ...]:
-    """The sizes of x and of where Euler's steps lead to, of h_look or of so much less that they can be trusted.
-
-    They move no kind of component by more than its size, and turn no kind of rate: it changes by no more than the
-    larger of before and after. `reach` is their length.
-    """
+    """The sizes of x and of where Euler's steps lead to, of h_look or as much less as can be trusted, `reach`."""
 
     def shorter(fine: Node, left: Node, reach: Node) -> Values:
         return {"left": (1.0 - fine) * (left - 1.0), "reach": cg.where(fine, reach, 0.25 * reach)}
 
     euler = (
-        Call(kinds.largest, ("x_start",), ("kind",)),
         copied("x_start", "x_ahead"),
         copied("rate_look", "rate_ahead"),
         each(lambda x_start: {"size_ahead": _size(x_start)}),
@@ -194,6 +171,7 @@ def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -
     )
     return (
         *_jump(problem, kinds),
+        Call(kinds.largest, ("x_start",), ("kind",)),
         call(lambda h_look: {"reach": h_look, "left": HALVINGS}),
         While("left", (*euler, call(shorter))),
         each(lambda fine, size_ahead, x_start: {"size": cg.where(fine, size_ahead, _size(x_start))}),
@@ -202,11 +180,9 @@ def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -
 
 
 @call
-def searched(
-    sized: Node, jumps: Node, first: Node, reach: Node, length: Node, longest_step: Node, least: Node
-) -> Values:
+def searched(sized: Node, jumps: Node, first: Node, reach: Node, h_first: Node, least: Node) -> Values:
     """Whether to search or to set out. Halving steps only leads to a jump; step control passes it, as any later one."""
-    h_try, jumps = cg.maximum(LEAP * cg.minimum(length, longest_step), least), sized * jumps
+    h_try, jumps = cg.maximum(h_first, least), sized * jumps
     return {
         "look": 0.0,
         "tested": 0.0,
@@ -218,10 +194,7 @@ def searched(
 
 
 def _euler(problem: Problem, kinds: StateKinds) -> tuple[Statement, ...]:
-    """One of Euler's steps; two of them, or as many as move all that moves, are `going`.
-
-    At rest each step may move one component more, the next of a chain; the first moves none where a force begins at 0.
-    """
+    """One of Euler's steps; two of them, or as many as move all that moves, are `going`, as of a chain at rest."""
 
     def doubtful(way: Node, kind: Node, change: Node, kind_before: Node, kind_ahead: Node) -> Values:
         near = cg.maximum(way <= kind, cg.equal(kind, 0.0))
@@ -280,9 +253,8 @@ def _set_out(problem: Problem, first_look: float) -> list[Statement]:
 def _turn(m: int, order: int) -> tuple[Statement, ...]:
     """Turn of the search after a trial: the next one, or whether its step is confirmed.
 
-    The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the first
-    derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps, both the
-    whole and the half steps keep nothing: there the first rate points much farther than the step goes.
+    Estimates of embedded methods can vanish by symmetry, such as at rest, and whole and half steps keep nothing of a
+    layer that a method damps: there the first rate points farther.
     """
 
     def halves(search: Node, accepted: Node) -> Values:

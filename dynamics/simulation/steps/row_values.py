@@ -24,10 +24,7 @@ def values_of(graph: Graph, inputs: Iterable[Any], *shape: int) -> Array:
 
 
 def converted(graph: Graph | None, times: ArrayLike, states: Array, parameters: ArrayLike = 0.0) -> Array:
-    """States (.., m) with what a graph gives of them in place of their last numbers, as qd of p; without one the same.
-
-    times, parameters: see `row_values`; parameters are 0 where they are forces that it does not depend on.
-    """
+    """States (.., m) with what a graph gives in place of their last numbers, as qd of p; without one the same."""
     if graph is None:
         return states
     last = row_values(graph, times, states, parameters)
@@ -35,10 +32,7 @@ def converted(graph: Graph | None, times: ArrayLike, states: Array, parameters: 
 
 
 def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayLike = ()) -> Array:
-    """The outputs (.., k) of a graph over the states, t and parameters, at states (.., m).
-
-    times: (..), or as many as go along the last axes.  parameters: (.., p) in the same way.
-    """
+    """Outputs (.., k) of a graph over states (.., m), t and parameters, of as many points as go along the last axes."""
     *shape, m = states.shape
     rows, t, count = states.reshape(-1, m), np.broadcast_to(times, shape).reshape(-1), len(graph.inputs) - m - 1
     held = np.broadcast_to(parameters, (*shape, count)).reshape(len(rows), count)
@@ -53,11 +47,7 @@ def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayL
 def origin(
     rate: Graph, times: Array, states: Array, held: ArrayLike, names: Mapping[str, str], beyond: float
 ) -> _shared.WhyNan:
-    """Where the first rate comes from that is not finite, or the first derivative of one.
-
-    rate: over the states, t and forces.  times: (T,).  states: (T, m).  held: forces, (T, p) or ().
-    beyond: the step [s] of a run that stopped at the last row, which is taken along the rate; 0 of one that did not.
-    """
+    """Where the first rate, or slope of it, comes from that is not finite.  beyond: the step [s] that failed, or 0."""
     m, forces = states.shape[1], np.broadcast_to(held, (len(times), len(rate.inputs) - states.shape[1] - 1))
     tried = [np.column_stack([states, times, forces])]
     if beyond and len(times):

@@ -24,19 +24,13 @@ ROUNDING_SIZE = 1e-10  # of the largest component of its kind: where one is that
 
 @dataclass(frozen=True, eq=False)
 class StateKinds:
-    """Components of a state that can be compared, (m,) each.
+    """Components of a state that can be compared, (m,) each."""
 
-    kinds, groups: the same number for those of one kind, as coordinates, or of one quantity, as a quaternion's.
-    lengths: what 1 of a component stands for beside 1 of others of its kind, see `System.lengths`.
-    ordinary: whether it is that of a first-order system, whose components may all round each other.
-    moved: of a velocity the coordinates that velocities like it move, by number; () of all else.
-    """
-
-    kinds: tuple[int, ...]
-    groups: tuple[int, ...]
-    lengths: tuple[float, ...]
-    ordinary: bool
-    moved: tuple[tuple[int, ...], ...]
+    kinds: tuple[int, ...]  # the same number for those of one kind, as coordinates
+    groups: tuple[int, ...]  # the same for those of one quantity, as a quaternion
+    lengths: tuple[float, ...]  # what 1 stands for beside 1 of others of its kind, see `System.lengths`
+    ordinary: bool  # whether it is that of a first-order system, whose components may all round each other
+    moved: tuple[tuple[int, ...], ...]  # of a velocity the coordinates that velocities like it move; () of all else
 
     def scale(self, size: Array) -> Array:
         """Scale of errors of components that have been so large, (.., m)."""
@@ -86,21 +80,19 @@ def _numbered(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
 
 
 def state_kinds(problem: Problem) -> StateKinds:
-    """Components that can be compared.
-
-    Coordinates are a kind, and velocities; those of no known length are others, and so is a group of several
-    coordinates, such as a quaternion.
-    """
-    system, nq, known, every = problem.system, problem.nq, list(map(bool, problem.lengths)), tuple(range(problem.size))
-    lengths = tuple([size or 1.0 for size in problem.lengths])
+    """Kinds: coordinates, velocities, those of no known length, and groups of several, such as a quaternion."""
+    system, nq, every = problem.system, problem.nq, tuple(range(problem.size))
     if system is None:
-        return StateKinds(every, every, lengths, ordinary=True, moved=((),) * problem.size)
-    of = system.kinematics.groups
-    groups = (*[of.index(group) for group in of], *every[nq:])  # by their first
+        return StateKinds(every, every, (1.0,) * problem.size, ordinary=True, moved=((),) * problem.size)
+    known = list(map(bool, system.lengths))
+    lengths = [size or 1.0 for size in system.lengths]
+    if problem.momenta:
+        lengths[nq:] = [1.0 / size for size in lengths[nq:]]
+    groups = (*map(system.kinematics.groups.index, system.kinematics.groups), *every[nq:])  # by their first
     kinds = [(k < nq, known[k], groups[k] if groups.count(groups[k]) > 1 else None) for k in every]
     still = every if problem.momenta else every[:nq]
     moved = [() if k in still else tuple([j for j in every[:nq] if known[j] == known[k]]) for k in every]
-    return StateKinds(tuple(map(kinds.index, kinds)), groups, lengths, ordinary=False, moved=tuple(moved))
+    return StateKinds(tuple(map(kinds.index, kinds)), groups, tuple(lengths), ordinary=False, moved=tuple(moved))
 
 
 def off_by(errors: Array, scale: Array, allowed: Array, components: tuple[str, ...]) -> str:

@@ -36,7 +36,7 @@ class StepProgram:
     dense: bool  # whether its record has dense output
     finest: float  # relative tolerance
     kinds: StateKinds
-    normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
+    normalization: Graph | None  # between steps, see Problem; with constraints and no parameters their projection
     nq: int  # coordinates in a state, which come first
     rows: Graph | None  # of chosen steps: see `constraint_rates`
 
@@ -71,11 +71,7 @@ class CompiledSteps:
 
 @kept_by_first
 def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgram:
-    """The steps of a method on a problem, all graphs that they need derived; the problem keeps them.
-
-    dense: whether a method that chooses its steps records its dense output.
-    Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
-    """
+    """The steps of a method on a problem, all graphs derived; the problem keeps them.  dense: with dense output."""
     steps, kinds = _normalized(method.program(problem, dense), problem, method), state_kinds(problem)
     if method.adaptive:
         steps = with_first_step(steps, problem, kinds, method.order, starts=method.starts)
@@ -90,7 +86,6 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         dense and method.adaptive,
         method.finest,
         kinds,
-        # between the ends of steps a projection serves where states and t are all that it needs
         problem.normalization if problem.projection is None or problem.parameters else problem.projection,
         problem.nq,
         constraint_rates(problem) if method.adaptive else None,
@@ -98,11 +93,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
 
 
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
-    """The steps with every state that a step arrives at normalized, so that errors do not add up along it.
-
-    Where there are constraints it is projected onto them, which normalizes it; of steps by error register `farthest`
-    tells how far, in tolerances.
-    """
+    """The steps, which normalize or project where they arrive; `farthest` tells how far, in tolerances."""
     if problem.projection is not None and method.adaptive:
         lengths = {**steps.registers, "onto": problem.size, "way": 1, "farthest": 1}
         onto = Call(problem.projection, ("x", "t", "p"), ("onto",))
