@@ -7,7 +7,7 @@ TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 if TYPE_CHECKING:
     from .autodiff.compressed_jacobian import CompressedJacobian as CompressedJacobian
     from .autodiff.hessian_solve import Order as Order, solve_tangents as solve_tangents
-    from .autodiff.jets import Jets as Jets, convolution as convolution
+    from .autodiff.jets import Jets as Jets
     from .autodiff.ldl_solve import ldl_solve as ldl_solve
     from .bridges.translation import Operations as Operations, operations as operations
     from .core.checks import check_name as check_name
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         tangent as tangent,
     )
     from .program.runners.batch_code import LaneCode as LaneCode
+    from .program.statement import with_names as with_names
     from .simplification.identities import shortened as shortened
     from .simplification.ordered_terms import ink as ink
     from .simplification.polynomial import (

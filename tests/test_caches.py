@@ -108,7 +108,7 @@ def used() -> list[np.ndarray]:
     rod = {"constraints": lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0}}
     bob = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1], "x y", **rod)
     runs = [
-        dyn.simulate(arm, q, qd, 0.1, dt=0.02, method="gauss8", progress=False),
+        dyn.simulate(arm, q, qd, 0.1, dt=0.02, method="gauss6", progress=False),
         dyn.simulate(arm, q, qd, 0.1, method="radau", form="momentum", progress=False),
         dyn.simulate(pushed, q, qd, 0.1, events=[dyn.Event("level", lambda q, qd, t: q[0])], progress=False),
         dyn.simulate(bob, [1.0, 0.0], [0.0, 0.0], 0.1, progress=False),

@@ -22,7 +22,7 @@ from ..operations.operation import columns
 from ..operations.series import by_partials
 from ..operations.table import equal, where
 from ..simplification.simplify import simplify
-from ..util.require import require_flag, require_graph, require_sequence, require_whole
+from ..util.require import require_flag, require_graph, require_whole
 from ..writing.naming import variables
 
 
@@ -53,21 +53,11 @@ class Jets(NamedTuple):
     pieces: tuple[Node, ...]
 
 
-def convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
-    """The sum over 0 < j < k of left_j right_k-j, of k - 1 > 0 factors each.
+def _convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
+    """The sum over 0 < j < k of left_j right_k-j; what needs the coefficients just before comes last.
 
-    What needs the coefficients just before comes last; of equal factors on both sides, each product is taken once.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import convolution
-    >>> left, right = cg.variables("a1 a2 a3"), cg.variables("b1 b2 b3")
-    >>> total = cg.Graph([*left, *right], {"sum": convolution(left, right)})
-    >>> total.evaluate({"a1": 1.0, "a2": 2.0, "a3": 3.0, "b1": 10.0, "b2": 100.0, "b3": 1000.0})
-    {'sum': 1230.0}
+    Of equal factors on both sides, each product is taken once.
     """
-    left, right = require_sequence("left", left, "nodes", Node), require_sequence("right", right, "nodes", Node)
-    if not len(left) == len(right) > 0:
-        raise ValueError(f"left and right must have as many nodes, at least one, got {len(left)} and {len(right)}")
     products: list[Node] = [a * b for a, b in zip(left, reversed(right), strict=True)]
     if all(a is b for a, b in zip(left, right, strict=True)):
         half = len(products) // 2
@@ -105,7 +95,7 @@ def straight(made: Jets, order: int) -> Graph:
     coefficients: list[Node] = []
     for k in range(1, order + 1):
         with building(build):
-            sums = [convolution(a, b) if k > 1 else constant(0.0) for a, b in zip(left, right, strict=True)]
+            sums = [_convolution(a, b) if k > 1 else constant(0.0) for a, b in zip(left, right, strict=True)]
         values = [*rates, unit, constant(float(k)), *zeros, *sums]
         now = folded(wanted, build, dict(zip(made.order.inputs, values, strict=True)))
         coefficients += now[:m]
@@ -119,7 +109,7 @@ ROUNDS = 100  # of partials of partials; those of the table come back to what is
 
 
 class NoSeriesError(ValueError):
-    """An operation without a Taylor series in the equations."""
+    """Equations without a Taylor series, for an operation that has none, or with too long a one."""
 
 
 def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import cgraph as cg
@@ -11,31 +10,24 @@ from cgraph import Node
 from cgraph.extend import Call, If, Statement, copied
 
 from .problem import Problem
-from .step import Step, Values, advanced, call, compensated, count, each, numbered, stage_time, total, weighted
+from .step import Step, Values, advanced, call, count, each, numbered, stage_time, summed, total, weighted
 from .step_control import SAFETY, SCALE, nonfinite, scale
-from .tableau import Tableau, real_stability
+from .tableau import RowOfWeights, Tableau, real_stability
 
 
 def explicit_step(tableau: Tableau, problem: Problem) -> Step:
     """The step; where the tableau has weights of an estimate, with it: the slope at its end is the next one's first."""
     stages = len(tableau.b)
-    rates, body = [Call(problem.rate, ("x", "t", "p"), ("slope0",))], list[Statement]()
+    rates, body, dense = [Call(problem.rate, ("x", "t", "p"), ("slope0",))], list[Statement](), list[Statement]()
     for k in range(1, stages):
-        body += _stage(problem, k, tableau.c[k], tableau.a[k], ("at", "at_t"))
+        body += [advanced("at", tableau.a[k]), *_slope(problem, k, tableau.c[k], "at")]
     if not tableau.error:
         return Step(body=[*body, advanced("x_new", tableau.b)], rates=rates)
-
-    def arrival(x: Node, rounding: Node, h: Node, *slopes: Node) -> Values:
-        """What rounding took off the step before is added."""
-        x_new, rounding_new = compensated(x, h * weighted(slopes, tableau.b) + rounding)
-        return {"x_new": x_new, "rounding_new": rounding_new}
-
-    dense: list[Statement] = []
     for k, (c, row) in enumerate(tableau.extra, start=stages + 1):
-        dense += _stage(problem, k, c, row, ("inside", "inside_t"))
-    dense += [_power(k, row) for k, row in enumerate(zip(*tableau.interpolant, strict=True), start=1)]
+        dense += [advanced("inside", row), *_slope(problem, k, c, "inside")]
+    dense += [_power(k, row) for k, row in enumerate(zip(*tableau.dense, strict=True), start=1)]
     return Step(
-        body=[*body, each(arrival, "x", "rounding", "h", *numbered("slope", stages))],
+        body=[*body, summed(("x", "rounding"), ("x_new", "rounding_new"), tableau.b)],
         rates=rates,
         kept=[copied("rounding_new", "rounding")],
         fixed=("rounding", "rounding_new"),
@@ -46,18 +38,14 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
     )
 
 
-def _stage(problem: Problem, k: int, c: float, weights: Sequence[float], at: tuple[str, str]) -> list[Statement]:
-    """Register slope{k}, from registers x, t, h and the slopes before, at a state and a time that are kept in `at`."""
-    return [advanced(at[0], weights), *_slope(problem, k, c, at)]
-
-
-def _slope(problem: Problem, k: int, c: float, at: tuple[str, str]) -> list[Statement]:
+def _slope(problem: Problem, k: int, c: float, at: str) -> list[Statement]:
     """Register slope{k} at a state and at t + c h, which a rate without t does not need."""
-    rate = Call(problem.rate, (at[0], at[1] if problem.timed else "t", "p"), (f"slope{k}",))
-    return [stage_time(at[1], c), rate] if problem.timed else [rate]
+    time = f"{at}_t" if problem.timed else "t"
+    rate = Call(problem.rate, (at, time, "p"), (f"slope{k}",))
+    return [stage_time(time, c), rate] if problem.timed else [rate]
 
 
-def _power(k: int, weights: Sequence[float]) -> Statement:
+def _power(k: int, weights: RowOfWeights) -> Statement:
     """The coefficient of s^k in the dense output of an accepted step."""
     slopes = numbered("slope", len(weights))
     return each(lambda h, *slopes: {f"dense{k}": h * weighted(slopes, weights)}, "h", *slopes)
@@ -82,7 +70,7 @@ def _error(tableau: Tableau, problem: Problem) -> list[Statement]:
             error = cg.where(cg.equal(both, 0.0), 0.0, cg.where(both < math.inf, first / cg.sqrt(both * m), both))
         return {"error": error}
 
-    slope = _slope(problem, stages, 1.0, ("x_new", "at_t"))
+    slope = _slope(problem, stages, 1.0, "x_new")
     known = [total(squares, "h", *SCALE, *numbered("slope", stages + 1)), call(estimate, *sums)]
     finite = [
         nonfinite("nonfinite_rate", f"slope{stages}"),
@@ -94,10 +82,7 @@ def _error(tableau: Tableau, problem: Problem) -> list[Statement]:
 
 
 def _at_limit(tableau: Tableau) -> list[Statement]:
-    """Counts accepted steps beyond the stability limit on the negative real axis (Hairer and Wanner II, section IV.2).
-
-    h |f(x_new) - f(y)| / |x_new - y|, with y the state of the last stage, which like x_new stands at t + h.
-    """
+    """Counts accepted steps with h |f(x_new) - f(y)| / |x_new - y| at the stability limit (Hairer, Wanner II, IV.2)."""
     if tableau.c[-1] != 1.0:
         return []
     stages = len(tableau.b)

@@ -27,36 +27,21 @@ KEPT_PROBLEMS = 16  # problems that stay for another run, with what was derived 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """xdot = f(x, t, p), derived by `derive`.
-
-    states: names, in the order of x (m,).  components: the same in words, for messages.
-    parameters: names of the inputs that stay inputs.  bound: {input: number} of those that are built in.
-    rate: f, inputs the states, t, parameters; outputs the rates of the states.
-    normalization: a state to the same one with the constraint of its coordinates met, as unit quaternions; None
-    without any.
-    projection: a state to one nearer to the constraints, and normalized; inputs the states, t, parameters. None without
-    constraints.
-    multipliers: of the constraints, by name; inputs the states, t, parameters. None without constraints.
-    system: the Lagrangian system; None for a first-order one.
-    velocities: qd of the states, where these are q and p = dL/dqd; inputs the states, t, parameters. None where they
-    are q and qd, as in `Problem`s that are derived.
-    momentum: p of q and qd, which are its inputs in place of the states; None where velocities is.
-    missing: what the velocities leave of the momenta; inputs as of these. None where they are not iterated.
-    """
+    """xdot = f(x, t, p), derived by `derive`. Graphs are over the states, t and the parameters."""
 
     model: Equations
-    states: tuple[str, ...]
-    components: tuple[str, ...]
-    parameters: tuple[str, ...]
-    bound: Mapping[str, float]
-    rate: Graph
-    normalization: Graph | None
-    projection: Graph | None
-    multipliers: Graph | None
-    system: System | None
-    velocities: Graph | None = None
-    momentum: Graph | None = None
-    missing: Graph | None = None
+    states: tuple[str, ...]  # names, in the order of x (m,)
+    components: tuple[str, ...]  # the same in words, for messages
+    parameters: tuple[str, ...]  # names of the inputs that stay inputs
+    bound: Mapping[str, float]  # {input: number} of those that are built in
+    rate: Graph  # f
+    normalization: Graph | None  # of states alone: with the constraint of coordinates met, as unit quaternions
+    projection: Graph | None  # a state to one nearer to the constraints, and normalized; None without constraints
+    multipliers: Graph | None  # of the constraints, by name
+    system: System | None  # None for a first-order one
+    velocities: Graph | None = None  # qd, of states q and p = dL/dqd; None of states q and qd
+    momentum: Graph | None = None  # p of q and qd, inputs in place of the states; None of states q and qd
+    missing: Graph | None = None  # what the velocities leave of the momenta; None where they are not iterated
 
     @property
     def size(self) -> int:
@@ -79,14 +64,6 @@ class Problem:
         system = self.system
         return system is not None and system.kinematics.quasi is None and not len(system.constraints)
 
-    @property
-    def lengths(self) -> tuple[float, ...]:
-        """Scale of each component of a state in comparisons, see `System.lengths`; of momenta the inverse of qd's."""
-        if self.system is None:
-            return (1.0,) * self.size
-        q, qd = self.system.lengths[: self.nq], self.system.lengths[self.nq :]
-        return (*q, *[1.0 / length if length else 0.0 for length in qd]) if self.momenta else (*q, *qd)
-
     @cached_property
     def timed(self) -> bool:
         """Whether f depends on t."""
@@ -106,10 +83,7 @@ class Problem:
 
 
 def derive(model: Model, bound: Mapping[str, float]) -> Problem:
-    """The problem of a model, with these numbers built in; of the last few, the one that was derived before.
-
-    Raises SingularMassMatrixError for a coordinate without inertia, TypeError for what is no model.
-    """
+    """The problem of a model, with these numbers built in; of the last few, the one that was derived before."""
     model = as_equations(model)
     inputs, system = state_inputs(model), model.system
     if system is None:
@@ -156,12 +130,12 @@ def _bind(graph: Graph, first: Sequence[str], parameters: Sequence[str], bound: 
 
 @kept_by_first
 def total_energy(problem: Problem) -> Graph | None:
-    """The energy E of a mechanical system: inputs the states, t, parameters. None for a first-order system."""
+    """The energy E of a mechanical system; None for a first-order system."""
     return None if problem.system is None else problem.bind(problem.states, energy(problem.system))
 
 
 def constraint_rates(problem: Problem) -> Graph | None:
-    """The rates of the constraints that are kept, by their names: inputs the states, t, parameters. None without."""
+    """The rates of the constraints that are kept, by their names; None without constraints."""
     system = problem.system
     if system is None or problem.projection is None:
         return None
@@ -172,7 +146,7 @@ def constraint_rates(problem: Problem) -> Graph | None:
 
 @kept_by_first
 def force(problem: Problem) -> Graph | None:
-    """tau + forces - damping qd: inputs the states, t, parameters. None for a first-order system."""
+    """tau + forces - damping qd; None for a first-order system."""
     system = problem.system
     if system is None:
         return None
@@ -183,13 +157,13 @@ def force(problem: Problem) -> Graph | None:
 
 @kept_by_first
 def state_jacobian(problem: Problem) -> Graph:
-    """df/dx, row by row: inputs the states, t, parameters."""
+    """df/dx, row by row."""
     return cg.simplify(cg.jacobian(problem.rate, list(problem.states)))
 
 
 @kept_by_first
 def time_derivative(problem: Problem) -> Graph:
-    """df/dt at fixed x: inputs the states, t, parameters."""
+    """df/dt at fixed x."""
     return cg.simplify(cg.jacobian(problem.rate, [TIME]))
 
 
@@ -201,11 +175,7 @@ def quantity(
     *,
     constant: bool = False,
 ) -> Node:
-    """A quantity of the state, function(q, qd, t[, p]) or (x, t[, p]), as a node over inputs that are not bound yet.
-
-    tau: of a quantity of the applied force besides, function(q, qd, tau, t[, p]).  constant: or a number.
-    Raises TypeError for what is no such function, ValueError for a result that is no node of the state.
-    """
+    """function(q, qd, [tau,] t[, p]) or (x, t[, p]) as a node over `quantity_inputs`; constant: or a number."""
     arguments = state_arguments(problem)
     if tau is None:
         node = call_user_function(what, function, *arguments)
@@ -248,18 +218,12 @@ def reaches(nodes: Iterable[Node], variables: Iterable[Node]) -> bool:
 
 def in_form(problem: Problem, form: str) -> Problem:
     """The problem that the steps of a run are of. Raises ValueError for a form that it has not."""
-    if require_choice("form", form, FORMS) == "velocity":
-        return problem
-    return momentum_form(problem)
+    return problem if require_choice("form", form, FORMS) == "velocity" else momentum_form(problem)
 
 
 @kept_by_first
 def momentum_form(problem: Problem) -> Problem:
-    """Problem of the motion in q and p = dL/dqd.
-
-    Raises ValueError for a first-order system; ConstraintError, SingularMassMatrixError and ValueError as
-    `hamilton_equations`.
-    """
+    """The motion in q and p = dL/dqd. Raises ValueError for a first-order system, and as `hamilton_equations`."""
     from ..equations.momentum.hamiltonian import hamilton_equations, missing_momenta, velocities
 
     system = problem.system

@@ -1,9 +1,7 @@
 """Radau IIA of order 5: three implicit stages, solved by simplified Newton with the exact Jacobian, for stiff systems.
 
-Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.8. The stages' increments Z are the rows of
-Z = T W; in W the Newton equations fall apart into one real system of the size of the state, (r/h - J), and a complex
-one, (c/h - J), here as a real one of twice the size. While the iteration converges fast the Jacobian stays, and while
-steps are alike the factors do.
+Hairer and Wanner II, section IV.8. The stages' increments Z are the rows of Z = T W; in W the Newton equations fall
+apart into a real system of the size of the state, (r/h - J), and a complex one, (c/h - J), here real of twice the size.
 """
 
 from __future__ import annotations
@@ -12,29 +10,46 @@ import math
 from dataclasses import replace
 from functools import reduce
 
-import numpy as np
-
 import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Call, Factor, FixedPoint, If, Solve, Statement, added, copied, effects
 
-from .jacobian_statements import identity, jacobian_statements
 from .problem import Problem
-from .step import Step, Values, call, combined, count, each, numbered, stage_time, total, weighted
+from .step import (
+    Step,
+    Values,
+    call,
+    combined,
+    count,
+    each,
+    identity,
+    jacobian_statements,
+    numbered,
+    stage_time,
+    total,
+    weighted,
+)
 from .step_control import SCALE, measured, nonfinite, scale
-from .tableau import RowOfWeights
 
 _R6 = math.sqrt(6.0)
 _C = ((4.0 - _R6) / 10.0, (4.0 + _R6) / 10.0, 1.0)
-_A = np.array(
-    [
-        [(88 - 7 * _R6) / 360, (296 - 169 * _R6) / 1800, (-2 + 3 * _R6) / 225],
-        [(296 + 169 * _R6) / 1800, (88 + 7 * _R6) / 360, (-2 - 3 * _R6) / 225],
-        [(16 - _R6) / 36, (16 + _R6) / 36, 1 / 9],
-    ]
-)
-_REAL = 3.0 + 3.0 ** (2 / 3) - 3.0 ** (1 / 3)  # eigenvalues of the inverse of A
+_REAL = 3.0 + 3.0 ** (2 / 3) - 3.0 ** (1 / 3)  # eigenvalues of A^-1
 _COMPLEX = complex(3.0 + 0.5 * (3.0 ** (1 / 3) - 3.0 ** (2 / 3)), 0.5 * (3.0 ** (5 / 6) + 3.0 ** (7 / 6)))
+_T = (  # columns: the real eigenvector of A^-1, and the real and imaginary part of the complex one
+    (-0.09123239487089298, -0.13132873395769526, -0.0),
+    (-0.24171793270710704, 0.25399349123779613, -0.30203528293465726),
+    (-0.9660481826150928, 0.8895251640260028, 0.18910246025104693),
+)
+_T_INVERSE = (
+    (-4.325579890063157, -0.33919925181580934, -0.5417705399358749),
+    (-4.609554734755688, 0.23563738984600238, 0.3763610775747559),
+    (-0.41460941294696624, -2.8412544601545533, 0.7500743514894451),
+)
+_POWERS = (  # row k has the weights of the Z in the power s^(k+1) of Z(s) / s, the quadratic through the Z at the nodes
+    (10.048809399827416, -1.3821427331607492, 0.33333333333333326),
+    (-25.62959144707664, 10.296258113743306, -2.6666666666666656),
+    (15.580782047249222, -8.914115380582556, 3.3333333333333326),
+)
 _ERROR = ((-13 - 7 * _R6) / 3, (-13 + 7 * _R6) / 3, -1 / 3)  # weights of Z / h in the estimate
 HALVES = (0.9 / 0.5) ** 4  # the error at which a step of estimate h^4 is halved
 TURNS = 8.0  # of Newton's iteration, at most
@@ -47,23 +62,6 @@ SAME_LENGTH = 1e-10  # relative: lengths of steps that are the same but for the 
 SMALL_COMPONENT = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
 Z, W, F = (numbered(name, 3) for name in "ZWF")
 POWERS, CHANGES = numbered("power", 3, 1), ("right0", "F1", "F2")  # of the guess; of W in a turn
-
-
-def _transformation() -> tuple[list[RowOfWeights], list[RowOfWeights]]:
-    """T and its inverse: columns the real eigenvector of A^-1, and the real and imaginary part of the complex one."""
-    inverse = np.linalg.inv(_A)
-    columns = []
-    for value in (_REAL, _COMPLEX):
-        shifted = inverse - value * np.eye(3)
-        vector = np.linalg.svd(shifted)[2][-1].conj()  # of the smallest singular value, which is 0
-        columns += [vector.real] if value == _REAL else [vector.real, vector.imag]
-    t = np.array(columns).T
-    return [tuple(row) for row in t.tolist()], [tuple(row) for row in np.linalg.inv(t).tolist()]
-
-
-_T, _T_INVERSE = _transformation()
-# Z(s) / s at the nodes c is a quadratic in s: its coefficients, row k of weights of the Z in the power s^(k+1).
-_POWERS = [tuple(row) for row in (np.linalg.inv(np.vander(_C, 3, increasing=True)) / np.array(_C)).tolist()]
 
 
 def radau_step(problem: Problem) -> Step:
@@ -118,10 +116,7 @@ def radau_step(problem: Problem) -> Step:
 
 @call
 def renewed(current: Node, accepted: Node, slow: Node, h_factored: Node) -> Values:
-    """Whether the Jacobian is evaluated: not if it is that of this state, or the last step converged fast by it.
-
-    After a trial by that of another state it is, and without an error to choose steps by always.
-    """
+    """Whether the Jacobian is evaluated: not if it is that of this state, or the last step converged fast by it."""
     fast = accepted * cg.equal(slow, 0.0) * cg.not_equal(h_factored, 0.0)
     result = (1.0 - current) * (1.0 - fast)
     return {"renewed": result, "current": cg.maximum(current, result)}
@@ -158,20 +153,16 @@ def _sizes(problem: Problem) -> Call:
 
 
 def _matrices(m: int) -> list[Statement]:
-    """Statements that factor the real and the complex matrix of Newton's iteration."""
+    """Statements that factor the real matrix of Newton's iteration, and [[a - J, b], [-b, a - J]], of the size 2 m."""
 
     def complex_matrix(jacobian: list[Node], h: Node) -> Values:
-        """[[a - J, b], [-b, a - J]], of the size 2 m, row by row."""
         a, b = _COMPLEX.real / h, _COMPLEX.imag / h
-        entries: list[Node | float] = []
-        for upper in (True, False):
-            for k in range(m):
-                row = jacobian[k * m : (k + 1) * m]
-                same = [a - entry if column == k else -entry for column, entry in enumerate(row)]
-                other: list[Node | float] = [0.0] * m
-                other[k] = b if upper else -b
-                entries += [*same, *other] if upper else [*other, *same]
-        return {"complex": entries}
+        upper, lower = list[Node | float](), list[Node | float]()
+        for k in range(m):
+            row = [a - entry if j == k else -entry for j, entry in enumerate(jacobian[k * m : (k + 1) * m])]
+            upper += [*row, *[b if j == k else 0.0 for j in range(m)]]
+            lower += [*[-b if j == k else 0.0 for j in range(m)], *row]
+        return {"complex": [*upper, *lower]}
 
     return [
         each(lambda unit, h, jacobian: {"real": _REAL / h * unit - jacobian}),
@@ -194,17 +185,12 @@ def _guess(z: str, c: float) -> Statement:
 
 @call
 def begin(rtol: Node) -> Values:
-    """Newton's iteration starts; it ends where a change is small beside the tolerance of the step.
-
-    Without a tolerance, where the step cannot be halved: beside rounding, after as many turns as it takes.
-    """
+    """Newton's iteration starts: until changes are small beside the tolerance; without one, beside rounding."""
     newton = cg.maximum(10.0 * EPSILON / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
     return {
         "going": 1.0,
-        "turns": 0.0,
-        "stalled": 0.0,
+        **dict.fromkeys(("turns", "stalled", "converged"), 0.0),
         "change_old": math.inf,
-        "converged": 0.0,
         "exact": cg.equal(rtol, 0.0),
         "newton": cg.where(rtol, newton, 10.0),
     }
@@ -236,14 +222,10 @@ def _change(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node, least: Nod
 
 
 def _judged(numbers: int) -> Call:
-    """Whether Newton's iteration goes on, and whether it has converged.
+    """Whether Newton's iteration goes on, and whether it has converged; beside rounding, if it comes no nearer."""
 
-    One that will not come to the tolerance in time has not; beside rounding, one that comes no nearer has.
-    """
-
-    def judged(
-        change: Node, change_old: Node, turns: Node, stalled: Node, exact: Node, newton: Node, evaluations: Node
-    ) -> Values:
+    def judged(change: Node, change_old: Node, turns: Node, *others: Node) -> Values:
+        stalled, exact, newton, evaluations = others
         size = cg.sqrt(change / numbers)
         rate = size / change_old  # 0 in the first turn
         left = rate / (1.0 - rate) * size
@@ -264,31 +246,28 @@ def _judged(numbers: int) -> Call:
             "evaluations": evaluations + 3.0,
         }
 
-    return call(judged)
+    return call(judged, *"change change_old turns stalled exact newton evaluations".split())
 
 
 def _estimate(problem: Problem) -> list[Statement]:
-    """The error as the real system filters it; filtered twice when the first says no (section IV.8, eq. 8.19 and 8.20).
-
-    Where Newton's iteration did not converge, an error that halves the step.
-    """
+    """The error as the real system filters it, twice if the first says no (eq. 8.20); HALVES without convergence."""
 
     def filtered(rate: str) -> list[Statement]:
         right = each(lambda rate, h, *z: {"error_vector": rate + weighted(z, _ERROR) / h}, rate, "h", *Z)
         return [right, Solve("real", "pivots", "error_vector"), *measured("error_vector", problem.size)]
+
+    def again(error: Node, accepted: Node, h_old: Node) -> Values:
+        return {"again": (error > 1.0) * cg.maximum(1.0 - accepted, cg.equal(h_old, 0.0))}
+
+    def finite(error: Node, converged: Node, nonfinite_real: Node, nonfinite_complex: Node) -> Values:
+        return {"error": cg.where(converged, error + nonfinite_real + nonfinite_complex, HALVES)}
 
     rate = Call(problem.rate, ("at", "t", "p"), ("F0",))
     return [
         nonfinite("nonfinite_real", "real"),
         nonfinite("nonfinite_complex", "complex"),
         *filtered("rate"),
-        call(
-            lambda error, accepted, h_old: {"again": (error > 1.0) * cg.maximum(1.0 - accepted, cg.equal(h_old, 0.0))}
-        ),
+        call(again),
         If("again", (added("x", "error_vector", "at"), rate, *filtered("F0"))),
-        call(
-            lambda error, converged, nonfinite_real, nonfinite_complex: {
-                "error": cg.where(converged, error + nonfinite_real + nonfinite_complex, HALVES)
-            }
-        ),
+        call(finite),
     ]

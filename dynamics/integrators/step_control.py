@@ -1,33 +1,26 @@
-"""Chosen steps: a method's step, tried until its error is within the tolerance; the registers, and step control.
+"""Methods, and what repeats their steps: of equal lengths, or chosen ones, tried until the error is within tolerance.
 
-A pass is a trial of one step, from t to t_new = t + h exactly, over the registers that `Method` lists. `tried` is its
-size before t_new was rounded; `fresh` is 1 before the first pass.
-
-A run begins with `anew` at 1, and goes on to a trial once it is set out, see `simulation.steps.first_step`: registers
-that a step hands on to the next are 0 then. `search` is positive while a first step is looked for: a trial then is none
-of the run, and not `recorded`. `trials` counts those of the run, of whose steps `longest_made` is the longest; `due` is
-1 after one by which sizes that make up atol are to be looked at, if it is `sized` by them: after 32, and then after
-twice as many.
-
-Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
-missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
-component by `leap`, rtol times that time over h. A step far shorter than those before passes a jump so. A pole stays
-one: on the way to it rates grow by a share of themselves in every step, and by that share the longest step is
-forgotten. On the way to a jump rates stay as they are, however many steps lead there. A step in which nothing moved
-says nothing of forces to come: the next is at most `still`.
+A pass of chosen steps is a trial of one, from t to t_new = t + h exactly, of the size `tried`. `anew` is 1 when a run
+begins, `search` positive while a first step is looked for (see `simulation.steps.first_step`): a trial then is no `row`
+of the record. `due` is 1 after a trial by which sizes that make up atol are to be looked at, if it is `sized` by them.
+What a force that jumps may be missed by is `leap`, for a share `jump` of the `longest` of the last steps; after a step
+in which nothing moved the next is at most `still`: docs/design.md says why.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import cgraph as cg
 from cgraph import Node
+from cgraph._shared import memo
 from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
 
 from .problem import Problem
-from .step import Step, Values, call, count, each, rate_calls, total, with_registers
+from .step import Step, Values, call, count, each, numbered, rate_calls, total, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 5.0  # factors from one step to the next
@@ -36,8 +29,65 @@ RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
 SCALE = ("x", "x_new", "rtol", "atol", "leap")
 FORGOTTEN = 0.1  # of the longest step at most, in every step that is shorter
 COLLAPSE = 2.0**-200  # steps below this share of a run never end it
-HERMITE = 3  # degree of the dense output of a step that has none of its own
+KEPT_METHODS = 32  # methods of an order
+SUM_ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
 SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has no error
+
+
+@dataclass(frozen=True)
+class Method:
+    """An integrator: what `dyn.METHODS` holds, and all that a simulation knows of a method."""
+
+    order: int  # p, where the error of a run falls as h^p
+    step: Callable[..., Step]  # of a problem; with order_at of a problem and an order
+    adaptive: bool = False  # whether a run chooses its steps by the estimate of their error
+    finest: float = SUM_ROUNDING  # relative tolerance below which a step's own rounding is larger
+    starts: bool = False  # whether `prepare` limits `next`: no first step is searched for, and rejection starts anew
+    order_at: Callable[[float], int] | None = None  # the order for a relative tolerance, at most `order`
+
+    def at(self, rtol: float) -> Method:
+        """The method for runs of a relative tolerance, of the order that this asks for."""
+        return self if self.order_at is None else _of_order(self, self.order_at(rtol))
+
+    def program(self, problem: Problem, dense: bool) -> Program:
+        """The steps of a run, one after another; dense: with dense output where they are chosen."""
+        step = self.step(problem)
+        if not self.adaptive:
+            return equal(step, problem)
+        if not step.error or step.estimate < 1:
+            raise ValueError("a method that chooses its steps needs their error, `Step.error`, and `Step.estimate`")
+        return chosen(step, problem, dense=dense, starts=self.starts)
+
+    def __repr__(self) -> str:
+        return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"
+
+
+@memo(KEPT_METHODS)
+def _of_order(method: Method, order: int) -> Method:
+    """The method of one order; the same object for the same, since problems keep programs by it."""
+    step = partial(method.step, order=order)
+    return replace(method, order=order, step=step, order_at=None)
+
+
+def equal_registers(problem: Problem) -> dict[str, int]:
+    """Registers of every program of equal steps."""
+    single = dict.fromkeys(("t", "h", "start", "count", "evaluations", "nonfinite"), 1)
+    return {"x": problem.size, "x_new": problem.size, "p": len(problem.parameters), **single}
+
+
+def equal(step: Step, problem: Problem) -> Program:
+    """Equal steps: one step a pass, of a length that is given, over and over."""
+    lengths = with_registers(step, equal_registers(problem))
+    made = count(rate_calls(problem, step.rates, step.prepare, step.body))
+    # the next time is computed from the start, without drift
+    time = call(lambda start, count, h: {"t": start + (count + 1.0) * h, "count": count + 1.0})
+    body = [*step.derived, time, made, nonfinite("nonfinite", "x")]
+    if step.failed:
+        body.append(call(lambda n, failed: {"nonfinite": n + failed, step.failed: 0.0}, "nonfinite", step.failed))
+    if step.start:
+        body.insert(0, first_pass(*step.start))
+        lengths["fresh"] = 1
+    return Program(lengths, body, record=["t", "x"], stop="nonfinite")
 
 
 def registers(problem: Problem) -> dict[str, int]:
@@ -45,22 +95,13 @@ def registers(problem: Problem) -> dict[str, int]:
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
     names += " evaluations at_limit t_old t_new jump longest leap still moved turned anew search trials due"
     names += " sized seen row largest longest_made"
-    m = problem.size
-    states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
+    states = dict.fromkeys(("x", "x_new", "x_old", "atol"), problem.size)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
-
-
-def recorded(dense: bool, degree: int) -> list[str]:
-    """Registers that a row of the record holds."""
-    return ["t", "h", "x", *(["t_old", "x_old", *(f"dense{k + 1}" for k in range(degree))] if dense else [])]
 
 
 @call
 def trial(t: Node, next_: Node, max_step: Node, end: Node, rtol: Node, jump: Node, longest: Node) -> Values:
-    """The step to try: `next`, or what is left; of a little more than one step, half, so that no sliver remains.
-
-    h = t_new - t, so that the clock and the state make the same step.
-    """
+    """The step to try: `next`, or what is left; of a little more than one step, half, so that no sliver remains."""
     left, most = abs(end - t), cg.minimum(next_, max_step)
     tried = cg.where(most >= left, left, cg.where(2.0 * most > left, 0.5 * left, most))
     t_new = cg.where(most >= left, end, t + cg.where(end > t, tried, -tried))
@@ -74,18 +115,12 @@ def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
 
 
 def control(more: int) -> Call:
-    """Call that accepts a trial or not, by its estimate. A NaN is an error beyond measure.
-
-    A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
-    be so short.
-
-    more: evaluations of the rate in a trial.
-    """
-    names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen".split()
+    """Call that accepts a trial or not, by its estimate; NaN is an error.  more: evaluations of the rate in a trial."""
+    names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen h"
 
     def judged(*values: Node) -> Values:
-        error, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *rest = values
-        search, trials, sized, seen, h, made = rest
+        error, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *others, made = values
+        search, trials, sized, seen, h = others
         arrives = cg.equal(t_new, end)
         able = cg.maximum(arrives, cg.minimum(wanted, max_step) > cg.maximum(min_step, RESOLUTION * abs(t)))
         accepted = able * (error <= 1.0)
@@ -102,14 +137,11 @@ def control(more: int) -> Call:
             "due": sized * (trials + 1.0 >= seen),
         }
 
-    return call(judged, *names, "h", "longest_made")
+    return call(judged, *names.split(), "longest_made")
 
 
 def accept_step(order: int, *after: Statement, starts: bool) -> If:
-    """An accepted step becomes the state; `after` is what the method does besides, with x still the old state.
-
-    order: of the step's size in the estimate.  starts: see `chosen`.
-    """
+    """An accepted step becomes the state.  after: what the method does besides, with x still the old state."""
 
     def grown(error: Node, error_old: Node, tried: Node, next_: Node, largest: Node) -> Values:
         growth = SAFETY * error ** -(1.0 / order - 0.75 * MEMORY) * cg.maximum(error_old, 1e-4) ** MEMORY
@@ -141,10 +173,7 @@ def longest_step(h: Node, longest: Node, turned: Node) -> Values:
 
 @total
 def turn_of_rates(h: Node, t: Node, t_old: Node, x: Node, x_new: Node, x_old: Node) -> Values:
-    """Squares of changes of the mean rate, each a share of the larger one, as ways in the time of this step.
-
-    Before the first step there is none.
-    """
+    """Squares of changes of the mean rate, each a share of the larger one, as ways in the time of this step."""
     before = cg.where(cg.equal(t, t_old), 0.0, h / (t - t_old)) * (x - x_old)
     way = x_new - x
     share = abs(way - before) / cg.maximum(cg.maximum(abs(way), abs(before)), SMALLEST_ATOL)
@@ -156,15 +185,13 @@ def first_pass(*statements: Statement) -> If:
     return If("fresh", (*statements, call(lambda fresh: {"fresh": 0.0})))
 
 
-def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
-    """A trial of one step a pass.
-
-    starts: whether the next step is at most what the derivatives at its start allow, whatever the one before was. After
-    a trial that was too long the rates are those of its end, so that all begins again.
-    """
+def chosen(step: Step, problem: Problem, *, dense: bool, starts: bool) -> Program:
+    """A trial of one step a pass.  starts: see `Method`."""
     polynomial = (step.dense or _hermite(problem)) if dense else ()
+    written = effects(polynomial)[1]
+    coefficients = [name for name in numbered("dense", len(written), 1) if name in written]
     lengths = with_registers(step, registers(problem), *step.error, *(step.handed or ()), *polynomial)
-    lengths |= dict.fromkeys([f"dense{k + 1}" for k in range(degree if dense else 0)], problem.size)
+    lengths |= dict.fromkeys(coefficients, problem.size)
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
     first, again = ([*step.start, *rates], prepare) if step.handed is not None else (step.start, [*rates, *prepare])
     body = _forgotten(step, problem)
@@ -172,11 +199,11 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
         body.append(first_pass(*first))
     if again:
         body += again if starts else [If("accepted", tuple(again))]
-    body += [trial, *step.body, *step.error]
-    body.append(control(rate_calls(problem, step.body, step.error)))
+    body += [trial, *step.body, *step.error, control(rate_calls(problem, step.body, step.error))]
     after = [If("row", (*polynomial, *_counted(problem, polynomial)))] if dense else []
     body.append(accept_step(step.estimate, *after, *step.kept, *(step.handed or ()), starts=starts))
-    return Program(lengths, body, recorded(dense, degree), record_if="row", stop="status")
+    record = ["t", "h", "x", *(["t_old", "x_old", *coefficients] if dense else [])]
+    return Program(lengths, body, record, record_if="row", stop="status")
 
 
 def _forgotten(step: Step, problem: Problem) -> list[Statement]:
@@ -189,10 +216,8 @@ def _forgotten(step: Step, problem: Problem) -> list[Statement]:
         first |= {name: None for name in reads if name not in written}
         if not STATEMENTS[type(statement)].bodies:  # which may run no time at all
             written |= {*writes}
-    return [If("anew", tuple([Map(ZERO, (name,), (name,)) for name in (*first, "anew")]), seldom=True)]
-
-
-ZERO = each(lambda a: {"zero": 0.0}).graph
+    zero = each(lambda a: {"a": 0.0}).graph
+    return [If("anew", tuple([Map(zero, (name,), (name,)) for name in (*first, "anew")]), seldom=True)]
 
 
 def _counted(problem: Problem, statements: Sequence[Statement]) -> list[Call]:
@@ -213,10 +238,7 @@ def _hermite(problem: Problem) -> list[Statement]:
 
 
 def measured(error: str, m: int) -> list[Statement]:
-    """Register `error`: the root mean square over the state of the register's (error / scale).
-
-    NaN where x_new is not finite: its scale would hide any error.
-    """
+    """Register `error`: the root mean square of the register's (error / scale); NaN where x_new is not finite."""
 
     def square(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node, e: Node) -> Values:
         part = e / scale(x, x_new, rtol, atol, leap)
@@ -236,13 +258,6 @@ def moved(m: int) -> list[Statement]:
     return [total(square), longer, copied("onto", "x")]
 
 
-def nonfinite(target: str, *registers: str) -> Sum:
-    """target = 0 where all numbers of registers of one length are finite, else NaN.
-
-    Divided by an infinite number, an error is 0: that of a step with infinite pivots.
-    """
-
-    def none(first: Node, *others: Node) -> Values:
-        return {target: sum([other - other for other in others], first - first)}
-
-    return total(none, *registers)
+def nonfinite(target: str, register: str) -> Sum:
+    """target = 0 where all numbers of a register are finite, else NaN: divided by infinite pivots, an error is 0."""
+    return total(lambda x: {target: x - x}, register)

@@ -3,15 +3,9 @@
 Stages Q_i = q + h sum_j a_ij V_j and P_i = p + h sum_j b_ij F(Q_j, V_j), with the velocity V_i that belongs to P_i at
 Q_i; a step adds h sum_i w_i V_i to q and h sum_i w_i F_i to p (Hairer, Lubich and Wanner, sections II.2 and VI.4). The
 stages are solved for by iterating on the velocities until they no longer come nearer, each turn a Newton step of
-V_i -> P_i(V_i), so that nothing has to be explicit, separable or quadratic. Sums over many steps are compensated, and
-numbers of the method that float64 does not hold are two, the second what rounding took off the first: a method is only
-symplectic as exactly as w_i b_ij + w_j a_ji = w_i w_j, and what is missing adds up to a drift of the energy (Hairer,
-McLachlan and Razakarivony, BIT Numerical Mathematics 2008).
-
-Quasi-velocities have no such momenta, and constraints hold them. Methods of Gauss, and compositions of `midpoint`, step
-the state (q, qd) there, as that of a system of first order. They keep every quadratic invariant, as |q| of a
-quaternion, and the energy and the size of the momentum of a free rotor; and being symmetric, they leave the energy of
-reversible motions without drift.
+V_i -> P_i(V_i). Sums over many steps are compensated, and numbers of the method are as exact as two float64, since what
+w_i b_ij + w_j a_ji = w_i w_j misses is a drift of the energy (Hairer, McLachlan and Razakarivony, BIT 2008). Where
+there are no such momenta, methods of Gauss step the state (q, qd), as that of a system of first order.
 """
 
 from __future__ import annotations
@@ -20,7 +14,6 @@ import itertools
 import math
 import operator
 from collections.abc import Sequence
-from dataclasses import replace
 from fractions import Fraction
 from functools import reduce
 from typing import NamedTuple
@@ -44,16 +37,19 @@ from cgraph.extend import (
 
 from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import TIME, new_variables
-from ..systems.system import System
 from .problem import Problem, reaches
-from .step import Step, Values, call, compensated, count, each, numbered, stage_time, total, weighted
-from .tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
+from .step import Step, Values, advanced, call, count, numbered, stage_time, summed, total
+from .tableau import HALF, MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned
 
 TURNS = 60.0  # of the iteration for the stages, at most
 CONVERGED = 2.0**-53  # a change below this, relative, is rounding
 DIVERGED = 1e-9  # one above this, when the turns are over, is no convergence: the step is too long
 REPEATS = 8  # Newton steps for the velocity of a momentum that is not linear in it
 ONCE = Composition(2, (1.0,))
+NO_MOMENTA = (
+    "this method advances coordinates and their momenta dL/dqd in turn, which a system of first order, with "
+    "constraints or with quasi-velocities does not have: take 'midpoint', 'gauss4' or 'dop853'"
+)
 
 
 class Mechanics(NamedTuple):
@@ -61,34 +57,28 @@ class Mechanics(NamedTuple):
 
     momentum: Graph  # (q, qd) -> p
     force: Graph  # (q, qd) -> p_dot = dL/dq + tau + forces - damping qd
-    velocity: Graph  # (q, qd, p, t, parameters, singular) -> qd, nearer to the velocity that belongs to p: a step of
-    # Newton, exact when K is quadratic in qd; and singular, if it was 0: 0 where M is positive definite, else
-    # 1 + the index of a coordinate without inertia
+    velocity: (
+        Graph  # (q, qd, p) -> qd, nearer to the velocity that belongs to p: a step of Newton, exact for quadratic K
+    )
     quadratic: bool  # the momenta are linear in the velocities: M does not depend on them
     separable: bool  # p = M qd with a constant M, and the forces do not depend on the velocities
 
 
 @kept_by_first
 def mechanics(problem: Problem) -> Mechanics:
-    """The graphs of momenta of a problem.
-
-    Raises ValueError for a system that has none, of first order, with quasi-velocities or with constraints;
-    SingularMassMatrixError for a coordinate without inertia.
-    """
+    """The graphs of momenta of a problem. Raises ValueError or SingularMassMatrixError where they are none."""
     system = problem.system
     if system is None or not problem.canonical:
-        raise ValueError("this method steps momenta dL/dqd of coordinates, which the model does not have")
-    build = Builder()
-    p = new_variables("p", system.n, system.parameters)
+        raise ValueError(NO_MOMENTA)
+    build, n, p = Builder(), system.n, new_variables("p", system.n, system.parameters)
     bars = cotangents({system.lagrangian: cg.constant(1.0)}, [*system.q, *system.qd], build)
-    slopes, momenta = bars[: system.n], bars[system.n :]
+    slopes, momenta = bars[:n], bars[n:]
     with building(build):
         parts = zip(slopes, system.tau, system.forces, system.damping, system.qd, strict=True)
         force = [slope + tau + applied - damping * qd for slope, tau, applied, damping, qd in parts]
         missing = [wanted - here for wanted, here in zip(p, momenta, strict=True)]
-    (before,) = new_variables("singular", 1, system.parameters)
     try:
-        *steps, info = _solved(system, missing, build)
+        steps = solve_nodes(system.lagrangian, system.qd, missing, build)
     except SingularError as error:
         raise SingularMassMatrixError(
             f"the mass matrix is singular: coordinate {system.coordinates[error.index]!r} has no inertia, or none that "
@@ -96,13 +86,10 @@ def mechanics(problem: Problem) -> Mechanics:
         ) from None
     with building(build):
         velocity = [qd + step for qd, step in zip(system.qd, steps, strict=True)]
-        singular = cg.where(before, before, info)
 
-    def graph(inputs: list[Node], outputs: list[Node], *last: Node) -> Graph:
-        numbered = {f"{k}": node for k, node in enumerate(outputs)}
-        whole = Graph([*inputs, *last, *system.tau, *system.extra_inputs], numbered)
-        bound = problem.bind([str(node.name) for node in (*inputs, *last)], whole)
-        return Graph([node for node in bound.inputs if node not in last] + list(last), bound.outputs)
+    def graph(inputs: list[Node], outputs: list[Node]) -> Graph:
+        whole = Graph([*inputs, *system.tau, *system.extra_inputs], {f"{k}": node for k, node in enumerate(outputs)})
+        return problem.bind([str(node.name) for node in inputs], whole)
 
     state = [*system.q, *system.qd]
     momentum, rate = graph(state, momenta), graph(state, force)
@@ -110,18 +97,7 @@ def mechanics(problem: Problem) -> Mechanics:
     quadratic = not reaches(mass_matrix, system.qd)
     free = not reaches(rate.outputs.values(), system.qd)
     constant = not reaches([*mass_matrix, *momentum.outputs.values()], [*system.q, system.t])
-    solved = graph([*state, *p], [*velocity, singular], before)
-    return Mechanics(momentum, rate, solved, quadratic, free and constant and quadratic)
-
-
-def _solved(system: System, rhs: list[Node], build: Builder) -> list[Node]:
-    """M^-1 rhs, and the info of `solve_nodes`: always 0 where a constant of M is negative, which divides as well."""
-    try:
-        return solve_nodes(system.lagrangian, system.qd, rhs, build, check=True)
-    except SingularError as error:
-        if not error.pivot:
-            raise
-    return [*solve_nodes(system.lagrangian, system.qd, rhs, build), cg.constant(0.0)]
+    return Mechanics(momentum, rate, graph([*state, *p], velocity), quadratic, free and constant and quadratic)
 
 
 def composed_step(composition: Composition, problem: Problem) -> Step:
@@ -135,22 +111,8 @@ def partitioned_step(method: Partitioned, problem: Problem, composition: Composi
     if problem.canonical and not problem.momenta:
         return _of_momenta(method, problem, composition)
     if not problem.canonical and method.a is not method.b:
-        raise ValueError(f"this method advances coordinates and {_lacking_momenta(problem)}")
+        raise ValueError(NO_MOMENTA)
     return _of_rates(method, problem, composition)
-
-
-def _lacking_momenta(problem: Problem) -> str:
-    """Reason why coordinates and momenta cannot be advanced in turn; empty if they can."""
-    system = problem.system
-    if system is None:
-        return "momenta in turn; a system of first order has none"
-    if len(system.constraints):
-        holding = f"constraint {system.constraints.names[0]!r} holds both"
-        return f"their momenta in turn, and {holding}: take 'midpoint', 'gauss4' or 'dop853'"
-    pairs = zip(system.velocities, system.qd, strict=True)
-    other = next(name for name, velocity in pairs if velocity not in system.q_dot)
-    no_rate = f"velocity {other!r} is the rate of no coordinate"
-    return f"their momenta in turn, and {no_rate}: take 'midpoint', 'gauss4' or 'dop853'"
 
 
 def _separable(problem: Problem) -> bool:
@@ -170,7 +132,7 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
         return Call(graphs.force, (q, v, t, "p"), (target,))
 
     def velocity(q: str, v: str, momentum: str, t: str, target: str) -> Call:
-        return Call(graphs.velocity, (q, v, momentum, t, "p", "singular"), (target, "singular"))
+        return Call(graphs.velocity, (q, v, momentum, t, "p"), (target,))
 
     settled = velocity("q", "v", "momentum", "later", "v")
     if graphs.separable and method in (SYMPLECTIC_EULER, VERLET):
@@ -180,9 +142,9 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
     else:
         turn: list[Statement] = []
         for i in stages:
-            turn += [_stage(method.a[i], "q", "V", f"Q{i}"), force(f"Q{i}", f"V{i}", f"time{i}", f"F{i}")]
+            turn += [advanced(f"Q{i}", method.a[i], "q", "V"), force(f"Q{i}", f"V{i}", f"time{i}", f"F{i}")]
         for i in stages:
-            turn.append(_stage(method.b[i], "momentum", "F", f"P{i}"))
+            turn.append(advanced(f"P{i}", method.b[i], "momentum", "F"))
             turn.append(velocity(f"Q{i}", f"V{i}", f"P{i}", f"time{i}", f"W{i}"))
         body = [*_iterated(method, turn), _added("q", "V", method.w), _added("momentum", "F", method.w)]
         body += [stage_time("later", 1.0), *[settled] * (1 if graphs.quadratic else REPEATS)]
@@ -209,7 +171,7 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
     else:
         turn: list[Statement] = [count(len(stages))] if problem.momenta else []
         for velocity in ("V", "W") if problem.momenta else "W":  # twice, since an error of V comes back to V by F
-            turn += [_stage(a[i], base, slope, f"{stage}{i}") for i in stages for base, stage, slope, a in parts]
+            turn += [advanced(f"{stage}{i}", a[i], base, slope) for i in stages for base, stage, slope, a in parts]
             turn += [rates([f"{part[1]}{i}" for part in parts], f"time{i}", velocity, i) for i in stages]
         body = [*_iterated(method, turn), *[_added(base, slope, method.w) for base, _, slope, _ in parts]]
     start = [rates("x", "t", "V"), *[copied(f"{slope}0", f"{slope}{i}") for slope in slopes for i in stages[1:]]]
@@ -218,8 +180,8 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
 
 def _step(method: Partitioned, lengths: dict[str, int], start: list[Statement], body: list[Statement]) -> Step:
     fixed = [*numbered("change", len(method.w)), *numbered("speed", len(method.w))]
-    fixed += "q_rounding momentum_rounding singular failed failures going turns change_old".split()
-    return Step({**lengths, "failed": 1, "singular": 1}, body, start=start, fixed=tuple(fixed), failed="failures")
+    fixed += "q_rounding momentum_rounding failed failures going turns change_old".split()
+    return Step({**lengths, "failed": 1}, body, start=start, fixed=tuple(fixed), failed="failures")
 
 
 def _parted(sizes: dict[str, int]) -> Call:
@@ -240,28 +202,9 @@ def _in_turn(composition: Composition, body: Sequence[Statement]) -> list[Statem
         return [*body, counted]
     result: list[Statement] = [copied("h", "whole_h"), copied("t", "whole_t")]
     for step, done in zip(composition.steps, itertools.accumulate(composition.steps, initial=0.0), strict=False):
-        result += [_part(step, done), *body, counted]
+        part = call(lambda h, t, step=step, done=done: {"h": step * h, "t": t + done * h}, "whole_h", "whole_t")
+        result += [part, *body, counted]
     return [*result, copied("whole_h", "h")]
-
-
-def _part(step: float, done: float) -> Call:
-    return call(lambda whole_h, whole_t: {"h": step * whole_h, "t": whole_t + done * whole_h})
-
-
-def _stage(weights: Fractions, base: str, slope: str, target: str) -> Map:
-    """target = base + h * (sum of weight * slope)."""
-
-    def stage(x: Node, h: Node, *slopes: Node) -> Values:
-        return {target: x + reduce(operator.add, _changes(h, slopes, weights))}
-
-    return each(stage, base, "h", *numbered(slope, len(weights)))
-
-
-def _changes(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> list[Node]:
-    """h * (sum of weight * slope), by the weights as float64 holds them, and by what it leaves of them, if anything."""
-    first = [float(weight) for weight in weights]
-    left = [float(weight - Fraction(number)) for weight, number in zip(weights, first, strict=True)]
-    return [h * weighted(slopes, numbers) for numbers in (first, left) if numbers is first or any(left)]
 
 
 def _iterated(method: Partitioned, turn: Sequence[Statement]) -> list[Statement]:
@@ -283,12 +226,10 @@ def _iterated(method: Partitioned, turn: Sequence[Statement]) -> list[Statement]
             "evaluations": evaluations + float(len(stages)),
         }
 
-    difference = total(lambda w, v: {"change": (w - v) ** 2.0}, "W", "V")
-    square = total(lambda w: {"speed": w * w}, "W")
     turn = list(turn)
     for i in stages:
-        turn.append(replace(difference, inputs=(f"W{i}", f"V{i}"), outputs=(changes[i],)))
-        turn += [replace(square, inputs=(f"W{i}",), outputs=(speeds[i],)), copied(f"W{i}", f"V{i}")]
+        turn.append(total(lambda w, v, i=i: {changes[i]: (w - v) ** 2.0}, f"W{i}", f"V{i}"))
+        turn += [total(lambda w, i=i: {speeds[i]: w * w}, f"W{i}"), copied(f"W{i}", f"V{i}")]
     turn.append(call(judged, "turns", "change_old", "evaluations", *changes, *speeds))
     begin = call(lambda: {"going": 1.0, "turns": 0.0, "change_old": math.inf})
     times = [stage_time(f"time{i}", float(method.c[i])) for i in stages]
@@ -297,22 +238,13 @@ def _iterated(method: Partitioned, turn: Sequence[Statement]) -> list[Statement]
 
 def _added(base: str, slope: str, weights: Fractions) -> Map:
     """base += h * (sum of weight * slope), with what rounding took off kept for the next step."""
-    rounding = f"{base}_rounding"
-
-    def end(x: Node, before: Node, h: Node, *slopes: Node) -> Values:
-        change, *rest = _changes(h, slopes, weights)
-        x, after = compensated(x, change + reduce(operator.add, rest, before))
-        return {base: x, rounding: after}
-
-    return each(end, base, rounding, "h", *numbered(slope, len(weights)))
+    registers = (base, f"{base}_rounding")
+    return summed(registers, registers, weights, slope)
 
 
 def _explicit(method: Partitioned, force: Call, velocity: Sequence[Statement], later: Call) -> list[Statement]:
-    """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration.
-
-    force, velocity: registers F0 and V0 at q and the momentum, at t.  later: F0 at a later time.
-    """
+    """A step without iteration, by F0 and V0 at q and the momentum, at t, and F0 later; where M is constant."""
     half = method is VERLET
-    kick = _stage(over(2, 1 if half else 2), "momentum", "F", "momentum")
+    kick = advanced("momentum", (HALF if half else Fraction(1),), "momentum", "F")
     body = [force, kick, *velocity, _added("q", "V", (Fraction(1),)), stage_time("later", 1.0)]
     return [*body, later, kick] if half else body

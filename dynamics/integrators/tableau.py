@@ -15,96 +15,32 @@ RowOfWeights = tuple[float, ...]
 Fractions = tuple[Fraction, ...]
 
 
-def _count(row: object) -> int:
-    """Numbers of a row, -1 of what is none."""
-    return len(row) if isinstance(row, tuple | list) else -1
-
-
 @dataclass(frozen=True)
 class Tableau:
-    """The numbers of an explicit Runge-Kutta method of s stages.
+    """The numbers of an explicit Runge-Kutta method; with weights of an error estimate it chooses its steps.
 
-    Stage k is taken at t + c_k h and x + h sum_j a_kj slope_j; the step adds h sum_k b_k slope_k. A tableau with
-    weights of an error estimate is an embedded method, which chooses its steps.
-
-    Parameters
-    ----------
-    order : int
-        p, where the error of a run falls as h^p.
-    c : tuple
-        Times of the stages, s numbers, the first 0.
-    a : tuple of tuples
-        Row k the weights of the slopes before stage k, k numbers.
-    b : tuple
-        Weights of the slopes in the step, s numbers.
-    error : tuple of tuples, optional
-        Weights of h slope_k in an estimate of the error of the step, s + 1 numbers, the last for the slope at the end
-        of the step. DOP853 has two estimates, which are combined.
-    estimate : int, optional
-        q, where the estimate falls as h^q; needed with `error`.
-    dense : tuple of tuples, optional
-        Row k the weights of slope k in the coefficients of s, s^2, .. of the dense output; without them the cubic
-        through states and slopes at both ends.
-    extra : tuple of (float, tuple), optional
-        Stages (c_k, a_k) that only the dense output needs.
-
-    Raises
-    ------
-    ValueError
-        For weights that are not as many as their stages, and for `error` without `estimate`.
-
-    Examples
-    --------
-    Kutta's 3/8 rule, as a method of `simulate` from here on:
-
-    >>> import dynamics as dyn
-    >>> from dynamics.integrators import Tableau, runge_kutta
-    >>> a = ((), (1 / 3,), (-1 / 3, 1), (1, -1, 1))
-    >>> rule = Tableau(4, c=(0, 1 / 3, 2 / 3, 1), a=a, b=(1 / 8, 3 / 8, 3 / 8, 1 / 8))
-    >>> dyn.METHODS["kutta38"] = runge_kutta(rule)
-    >>> dyn.METHODS["kutta38"]
-    <Method of order 4, equal steps>
-    >>> decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
-    >>> dyn.simulate(decay, [1.0], None, 1.0, "kutta38", dt=0.1).q[-1].round(6)
-    array([0.36788])
-    >>> del dyn.METHODS["kutta38"]
+    Stage k is taken at t + c_k h and x + h sum_j a_kj slope_j; the step adds h sum_k b_k slope_k.
     """
 
     order: int
     c: RowOfWeights
     a: tuple[RowOfWeights, ...]
     b: RowOfWeights
-    error: tuple[RowOfWeights, ...] = ()
-    estimate: int = 0
-    dense: tuple[RowOfWeights, ...] = ()
-    extra: tuple[tuple[float, RowOfWeights], ...] = ()
+    error: tuple[RowOfWeights, ...] = ()  # weights of h slope_k in estimates, the last for the slope at the end
+    estimate: int = 0  # q, where the estimate falls as h^q
+    dense: tuple[RowOfWeights, ...] = ()  # row k: weights of slope k in the coefficients of s, s^2, ..
+    extra: tuple[tuple[float, RowOfWeights], ...] = ()  # stages (c_k, a_k) that only the dense output needs
 
     def __post_init__(self) -> None:
-        stages = len(self.b)
-        if len(self.c) != stages or [_count(row) for row in self.a] != [*range(stages)]:
+        s = len(self.b)
+        fits = len(self.c) == len(self.a) == s and all(len(row) == k for k, row in enumerate(self.a))
+        if not fits or any(not isinstance(row, tuple) or len(row) != s + 1 for row in self.error):
             raise ValueError(
-                f"a tableau of {stages} weights b needs as many times c and rows a of 0 to {stages - 1} numbers, got "
-                f"{len(self.c)} times and rows of {', '.join(str(_count(row)) for row in self.a) or 'none'}"
-            )
-        if wrong := [row for row in self.error if _count(row) != stages + 1]:
-            raise ValueError(
-                f"error of a tableau is a tuple of rows of {stages + 1} weights, one a stage and one for the slope at "
-                f"the end of the step, got {wrong[0]!r:.60} for a row"
+                f"a tableau of {s} weights b needs as many times c, rows a of 0 to {s - 1} weights, and for error rows "
+                f"of {s + 1}, got c={self.c}, a={self.a}, error={self.error}"
             )
         if self.error and self.estimate < 1:
             raise ValueError(f"error of a tableau needs estimate, q where it falls as h^q, got {self.estimate!r}")
-
-    @property
-    def interpolant(self) -> tuple[RowOfWeights, ...]:
-        """`dense`, or in its place the weights of Hermite's cubic, a row for each slope, that at the end included.
-
-        x + s h f0 + s^2 (3 D - h (2 f0 + f1)) + s^3 (h (f0 + f1) - 2 D), with D = h sum_k b_k slope_k.
-        """
-        if self.dense:
-            return self.dense
-        first = [1.0, *[0.0] * len(self.b)]
-        step = zip(first, (*self.b, 0.0), reversed(first), strict=True)
-        return tuple([(f0, 3.0 * b - 2.0 * f0 - f1, f0 + f1 - 2.0 * b) for f0, b, f1 in step])
 
 
 EULER = Tableau(1, c=(0.0,), a=((),), b=(1.0,))
@@ -203,13 +139,11 @@ def _row(weights: _Sparse, length: int) -> RowOfWeights:
 def _dense() -> tuple[RowOfWeights, ...]:
     """Weights of the slopes in the powers of s, from the nested form that the program evaluates.
 
-    x + s (F0 + (1 - s) (F1 + s (F2 + (1 - s) (F3 + s (F4 + (1 - s) (F5 + s F6)))))), with F0 the whole step, F1 and F2
-    of Hermite's kind and the other F from the table.
+    x + s (F0 + (1 - s) (F1 + s (F2 + (1 - s) (F3 + s (F4 + (1 - s) (F5 + s F6)))))), with F3 to F6 from the table.
     """
-    stages = 16
-    whole, first, last = np.array(_row(_B, stages)), np.eye(stages)[0], np.eye(stages)[12]
-    parts = [whole, first - whole, 2.0 * whole - first - last, *(np.array(_row(weights, stages)) for weights in _D)]
-    powers = np.zeros((len(parts) + 1, stages))
+    whole, first, last = np.array(_row(_B, 16)), np.eye(16)[0], np.eye(16)[12]
+    parts = [whole, first - whole, 2.0 * whole - first - last, *(np.array(_row(weights, 16)) for weights in _D)]
+    powers = np.zeros((len(parts) + 1, 16))
     for k, part in reversed(list(enumerate(parts))):
         powers[0] += part
         shifted = np.roll(powers, 1, axis=0)
@@ -245,8 +179,7 @@ def real_stability(tableau: Tableau) -> float:
 
 
 DIGITS = 50  # of the numbers of Gauss's methods
-NEWTON = 8  # steps that make 50 digits of a guess that has two or three
-_0, _1 = Fraction(0), Fraction(1)
+_0, HALF, _1 = Fraction(0), Fraction(1, 2), Fraction(1)
 
 
 @dataclass(frozen=True)
@@ -260,71 +193,33 @@ class Partitioned:
     c: Fractions
 
 
-def gauss(stages: int) -> Partitioned:
-    """Gauss's method of s stages, of order 2 s: collocation at the roots x of Legendre's polynomial P_s.
-
-    With c = (1 + x) / 2 and w = 1 / ((1 - x^2) P_s'(x)^2), a_ij, the integral of Lagrange's polynomial j to c_i, is
-    w_j (c_i + sum over 0 < k < s of P_k(x_j) (P_k+1(x_i) - P_k-1(x_i)) / 2)  (Hairer and Wanner II, section IV.5).
-    """
-    roots = [_root(stages, i) for i in reversed(range(stages))]
-    p = [_legendre(stages, x) for x in roots]
-    w = [_rounded(1 / ((1 - x * x) * _slope(values, x) ** 2)) for x, values in zip(roots, p, strict=True)]
-    a = []
-    for x, here in zip(roots, p, strict=True):
-        rises = [(here[k + 1] - here[k - 1]) / 2 for k in range(1, stages)]
-        total = [(1 + x) / 2 + sum([u * v for u, v in zip(there[1:], rises, strict=False)], _0) for there in p]
-        a.append(tuple([_rounded(weight * each) for weight, each in zip(w, total, strict=True)]))
-    rows = tuple(a)
-    return Partitioned(2 * stages, rows, rows, tuple(w), tuple([sum(row, _0) for row in rows]))
+def _gauss(order: int, a: tuple[Fractions, ...], w: Fractions) -> Partitioned:
+    return Partitioned(order, a, a, w, tuple([sum(row, _0) for row in a]))
 
 
-def _legendre(degree: int, x: Fraction) -> list[Fraction]:
-    """P_0(x) .. P_degree(x)."""
-    p = [_1, x]
-    for k in range(1, degree):
-        p.append(_rounded(((2 * k + 1) * x * p[k] - k * p[k - 1]) / (k + 1)))
-    return p
+def _root(n: int) -> Fraction:
+    return Fraction(math.isqrt(n * 10 ** (2 * DIGITS)), 10**DIGITS)
 
 
-def _slope(p: list[Fraction], x: Fraction) -> Fraction:
-    """P_s'(x) of P_0(x) .. P_s(x)."""
-    s = len(p) - 1
-    return s * (x * p[s] - p[s - 1]) / (x * x - 1)
-
-
-def _root(degree: int, i: int) -> Fraction:
-    """Root i of Legendre's polynomial, from the largest down, by Newton's method."""
-    x = _rounded(Fraction(math.cos(math.pi * (i + 0.75) / (degree + 0.5))))
-    for _ in range(NEWTON):
-        p = _legendre(degree, x)
-        x = _rounded(x - p[degree] / _slope(p, x))
-    return x
-
-
-def _rounded(x: Fraction) -> Fraction:
-    return Fraction(round(x * 10**DIGITS), 10**DIGITS)
-
-
-def over(denominator: int, *numerators: int) -> Fractions:
-    """The numerators, each over the denominator."""
-    return tuple([Fraction(numerator, denominator) for numerator in numerators])
-
-
+_B4, _R4 = Fraction(1, 4), _root(3) / 6
+_B6, _C6, _R6 = Fraction(5, 36), Fraction(2, 9), _root(15)
+GAUSS4 = _gauss(4, ((_B4, _B4 - _R4), (_B4 + _R4, _B4)), (HALF, HALF))
+_A6 = (
+    (_B6, _C6 - _R6 / 15, _B6 - _R6 / 30),
+    (_B6 + _R6 / 24, _C6, _B6 - _R6 / 24),
+    (_B6 + _R6 / 30, _C6 + _R6 / 15, _B6),
+)
+GAUSS6 = _gauss(6, _A6, (2 * _B6, 2 * _C6, 2 * _B6))
 SYMPLECTIC_EULER = Partitioned(1, a=((_0,),), b=((_1,),), w=(_1,), c=(_0,))
-VERLET = Partitioned(2, a=(over(2, 0, 0), over(2, 1, 1)), b=(over(2, 1, 0),) * 2, w=over(2, 1, 1), c=(_0, _1))
-MIDPOINT = gauss(1)
+VERLET = Partitioned(2, a=((_0, _0), (HALF, HALF)), b=((HALF, _0),) * 2, w=(HALF, HALF), c=(_0, _1))
+MIDPOINT = _gauss(2, ((HALF,),), (_1,))
 PARTITIONED = {"symplectic_euler": SYMPLECTIC_EULER, "verlet": VERLET, "midpoint": MIDPOINT}
-PARTITIONED |= {"gauss4": gauss(2), "gauss6": gauss(3)}
+PARTITIONED |= {"gauss4": GAUSS4, "gauss6": GAUSS6}
 
 
 @dataclass(frozen=True)
 class Composition:
-    """A method of higher order: steps of a symmetric one of order two, of gamma_1 h, gamma_2 h, .., in turn.
-
-    The base is `verlet` where it is explicit (kinetic energy of the velocities alone, forces of the coordinates), and
-    else `midpoint`, which takes any Lagrangian and systems of first order. A palindrome of numbers makes a symmetric
-    method, and steps of symplectic maps are symplectic.
-    """
+    """Steps of a symmetric method of order two, `verlet` or else `midpoint`, of gamma_1 h, gamma_2 h, .., in turn."""
 
     order: int
     steps: tuple[float, ...]  # gamma_1, gamma_2, .., which add up to 1

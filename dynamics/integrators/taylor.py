@@ -1,12 +1,8 @@
 """Taylor's method: steps by the Taylor series of the solution, of an order by the tolerance.
 
 Order and step follow Jorba and Zou, Experimental Mathematics 14 (2005) 99: the step at which the last two terms are as
-small as the tolerance, and order -log(rtol) / 2 + 3, two more than theirs. Coefficients are of the time in units of the
-step before, so that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where
-the derivative of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
-
-All coefficients are one graph where it is short: its values stay in registers. Else a graph of one order is repeated,
-with sums of products over many nodes at a time.
+small as the tolerance. Coefficients are of the time in units of the step before, so that they neither overflow nor
+depend on the unit of time. What a step missed is seen at its end, where the derivative has to be the rate.
 """
 
 from __future__ import annotations
@@ -16,45 +12,42 @@ import math
 import operator
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import Jets, convolution, kept_by_first
+from cgraph._shared import Jets, kept_by_first
 from cgraph.extend import Call, If, NoSeriesError, Statement, copied, jets, straight
 
 from ..systems.arguments import TIME
 from .problem import Problem
 from .step import Step, Values, call, compensated, count, each, numbered, stage_time, total
 
-# Operations of all coefficients, before folding, that are one straight graph: more take a second to compile, and would
-# run a third faster.
-SHORT_CODE = 24_000
+MOST_OPERATIONS = 300_000  # of a series, before folding: as many take 20 s to compile
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
-# Units in a step, inverse: a shorter one is tried again in a unit of its own, for what starts at 0 is measured by its
-# first change, which is that of a whole unit.
-APART = 3.0
+APART = 3.0  # units in a step, inverse: a shorter one is tried again in a unit of its own, by its own first change
 SHORTEST = 2.0**-10  # units: the first try where terms say nothing, as of what stays at 0, or overflow
 
 
 def taylor_step(problem: Problem, order: int) -> Step:
-    """The step of an order."""
+    """The step of an order. Raises NoSeriesError for equations without a series, or with too long a one."""
     m, graphs, c = problem.size, _jets(problem), numbered("c", order, 1)
-    if order * (len(graphs.order.nodes) + graphs.sums * order) <= SHORT_CODE:
-        series: list[Statement] = [Call(straight(graphs, order), ("rate", "unit", "zeros"), tuple(c))]
-        lengths: dict[str, int] = {}
-    else:
-        series, lengths = _by_orders(m, graphs, order)
-
+    operations = order * (len(graphs.order.nodes) + graphs.sums * order)
+    if operations > MOST_OPERATIONS:
+        raise NoSeriesError(
+            f"method 'taylor' of order {order} needs {operations} operations for the series of these equations, and "
+            f"takes at most {MOST_OPERATIONS}: take another method, such as 'dop853'"
+        )
     begin = call(lambda next_, end, t: {"unit": cg.minimum(next_, abs(end - t)), "starting": 1.0})
     # By itself, so that the arrival follows no call that writes coefficients: it would gather them one by one.
     share = replace(call(lambda h, unit: {"s": h / unit}), exact=True)
     at_all = call(lambda unit, h: {"unit": cg.where(unit, unit, h)})  # where nothing is wished
     controls = ["unit", "last", "before", "next", "end", "rtol", "s", "at_t", "starting"]
     return Step(
-        lengths | dict.fromkeys([*c, "rate"], m) | {"zeros": graphs.zeros},
+        dict.fromkeys([*c, "rate"], m) | {"zeros": graphs.zeros},
         [share, _arrival(order)],
         [_rates(graphs, "x", "t"), count(1)],
-        [at_all, *series, *_wish(order)],
+        [at_all, Call(straight(graphs, order), ("rate", "unit", "zeros"), tuple(c)), *_wish(order)],
         [begin],
         kept=[copied("rounding_new", "rounding"), call(lambda h: {"unit": h, "starting": 0.0})],
         fixed=("rounding", "rounding_new", "atol", "weight", *controls),
@@ -80,31 +73,8 @@ def _jets(problem: Problem) -> Jets:
         ) from None
 
 
-def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[str, int]]:
-    """Coefficients of one order after another, and the lengths of registers that it takes; `none` stays 0."""
-    orders = {name: float(k) for k, name in enumerate(numbered("order", order, 1), 1)}
-    body: list[Statement] = [copied("rate", "rates0"), call(lambda: orders)]
-    lengths = dict.fromkeys([*numbered("left", order, 1), *numbered("right", order, 1), "sums", "none"], graphs.sums)
-    for k in range(1, order + 1):
-        if k > 1 and graphs.sums:
-            body.append(_products(k - 1))
-        inputs = (f"rates{(k - 1) % 2}", "unit", f"order{k}", "zeros", "sums" if k > 1 else "none")
-        body.append(Call(graphs.order, inputs, (f"c{k}", f"rates{k % 2}", f"left{k}", f"right{k}")))
-    return body, lengths | dict.fromkeys(("rates0", "rates1"), m)
-
-
-def _products(k: int) -> Statement:
-    """The sums over products of both sides up to an order."""
-    sides = [*numbered("left", k, 1), *numbered("right", k, 1)]
-    return each(lambda *factors: {"sums": convolution(factors[:k], factors[k:])}, *sides)
-
-
 def _wish(order: int) -> list[Statement]:
-    """Register `next`: at most the step at which the last two terms are within the tolerance.
-
-    That is y^(-1 / 2k) units, y the sum of squares of c_k over the tolerance, with a safety factor. Both are taken as a
-    power of the higher order alone, which is the same for a step as long as the one before, and takes half the time.
-    """
+    """Register `next`: at most y^(-1 / 2k) units, y the squares of the last terms over the tolerance, k the order."""
 
     def later(x: Node, rtol: Node, atol: Node, first: Node) -> Values:
         """What starts at 0 is as large as its first change."""
@@ -113,7 +83,7 @@ def _wish(order: int) -> list[Statement]:
     def at_start(x: Node, rtol: Node, atol: Node, *terms: Node) -> Values:
         """Under a force that begins at 0 that is 0, too, but not its largest."""
         size = cg.maximum(abs(x), abs(terms[0]))
-        return {"weight": 1.0 / (atol + rtol * cg.where(size, size, _largest(terms)))}
+        return {"weight": 1.0 / (atol + rtol * cg.where(size, size, reduce(cg.maximum, map(abs, terms))))}
 
     def wish(last: Node, before: Node, unit: Node, next_: Node) -> Values:
         both = cg.maximum(math.exp(1.4) * before, math.exp(4.0 + 1.4 * order / (order - 1.0)) * last)
@@ -129,15 +99,6 @@ def _wish(order: int) -> list[Statement]:
         replace(last, inputs=(f"c{order - 1}", "weight"), outputs=("before",)),
         call(wish),
     ]
-
-
-def _largest(c: Sequence[Node]) -> Node:
-    """The largest size, by halves side by side."""
-    sizes = [abs(each) for each in c]
-    while len(sizes) > 1:
-        pairs = zip(sizes[::2], sizes[1::2], strict=False)
-        sizes = [*[cg.maximum(one, other) for one, other in pairs], *sizes[len(sizes) // 2 * 2 :]]
-    return sizes[0]
 
 
 def _arrival(order: int) -> Statement:
@@ -162,10 +123,7 @@ def _polynomial(c: Sequence[Node], s: Node) -> Node:
 
 
 def _checked(m: int, order: int) -> list[Statement]:
-    """Register `error`: what the step misses by its defect, the difference of rate and derivative at its end.
-
-    One that has to be tried again misses a tolerance more.
-    """
+    """Register `error`: the defect, the difference of rate and derivative at the end; more for what is tried again."""
 
     def square(slope: Node, rate: Node, x: Node, x_new: Node, rtol: Node, atol: Node, h: Node) -> Values:
         scale = atol + cg.maximum(rtol, CHECKED) * cg.maximum(abs(x), abs(x_new)) + CHECKED * abs(slope)

@@ -267,7 +267,6 @@ def outcome(
         error,
         at_end,
         (*run.warnings, *doubts),
-        *run.prices,
     )
     return stats, recorder
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from cgraph._shared import Array, nearest, or_nearest, real_array, real_number, require_flag
 
 from ..equations.states.initial_value import times_to_record
-from ..integrators import METHODS, MOST_STAGES, Method
+from ..integrators import METHODS, Method
 from ..integrators.step_control import RESOLUTION
 from .steps.equal_steps import step_count
 
@@ -323,8 +323,6 @@ def check_method(method: str) -> None:
     if not isinstance(method, str):
         raise TypeError(f"method must be one of {', '.join(METHODS)}, got {method!r:.60}")
     if method not in METHODS:
-        if method.startswith("gauss"):
-            raise ValueError(f"Gauss methods are gauss2, gauss4, .. up to gauss{2 * MOST_STAGES}, got {method!r:.60}")
         near = " or ".join(map(repr, nearest(method, METHODS)))
         hint = f"did you mean {near}?" if near else f"there are {', '.join(METHODS)}"
         raise ValueError(f"there is no method {method!r:.60}; {hint}")

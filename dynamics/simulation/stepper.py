@@ -70,7 +70,7 @@ class Stepper(ABC):
         """every_step: whether every step is in a block, or of a block the last alone."""
         self.compiled, self.program, self.runner, self.options = compiled, compiled.program, compiled.runner, options
         self.control, self.log, self.stopped, self.every_step = control, log, stopped, every_step
-        self.components, self.parameters, self.prices = self.program.components, list[float](), compiled.prices
+        self.components, self.parameters = self.program.components, list[float]()
         self._at, self._passes = compiled.places, FIRST_PASSES
         self._stop = self._at[str(self.runner.program.stop)]
         self._start, self._memory = np.zeros(self.runner.size), np.zeros(self.runner.size)

@@ -73,9 +73,6 @@ class Stats:
         in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
-    njev_cost, nlu_cost : float
-        Operations of one evaluation of the Jacobian, and of one factorization, over those of the rate, so that
-        nfev + njev_cost njev + nlu_cost nlu is what the run cost in evaluations of the rate, but for its solves.
 
     Examples
     --------
@@ -99,8 +96,6 @@ class Stats:
     error: float | None = None
     error_at_end: float | None = None
     warnings: tuple[str, ...] = ()
-    njev_cost: float = 0.0
-    nlu_cost: float = 0.0
 
 
 class Crossings(NamedTuple):

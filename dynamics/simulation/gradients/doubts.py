@@ -12,8 +12,7 @@ from cgraph._shared import Array
 
 from ..estimates.error_estimate import LAWLESS
 from ..outcome import MotionError
-from ..steps.state_sizes import off_by
-from ..steps.step_program import state_kinds
+from ..steps.state_sizes import off_by, state_kinds
 from ..unreached_momenta import unreached_momenta
 from .differentiated_run import DifferentiatedRun
 

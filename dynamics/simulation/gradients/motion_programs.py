@@ -19,8 +19,8 @@ from cgraph.extend import STATEMENTS, Builder, Call, Map, Program, Statement, fo
 
 from ...equations.substitute import substitute
 from ...integrators import Method, Problem
-from ...integrators.method import equal_registers
 from ...integrators.step import with_registers
+from ...integrators.step_control import equal_registers
 from ...systems.arguments import TIME, new_variables
 from ..steps.step_program import normalizing
 from .rate_pullback import RatePullback, rate_pullback, sharing

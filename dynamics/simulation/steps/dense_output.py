@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +15,6 @@ from cgraph import Graph
 from cgraph._shared import Array, kept_by_first, real_array
 
 from .row_values import converted, values_of
-
-if TYPE_CHECKING:
-    from cgraph import Compiled
 
 UNIT = 2.0**-53  # relative error of one rounding
 
@@ -38,19 +35,33 @@ class StepBlock(NamedTuple):
     @property
     def nbytes(self) -> int:
         """Bytes of the numbers."""
-        arrays = (self.t, self.x, self.t_old, self.h, self.x_old, self.dense)
-        return sum(array.nbytes for array in arrays if array is not None)
+        return sum(array.nbytes for array in self._arrays().values())
+
+    def _arrays(self) -> dict[str, Array]:
+        return {name: value for name, value in self._asdict().items() if isinstance(value, np.ndarray)}
 
     def states_at(self, rows: Indices, s: Array) -> Array:
         """States (k, m) at the shares s (k,) of the steps `rows` (k,)."""
+        states, graph = self._polynomial(rows, s), self.normalization
+        if graph is None:
+            return states
+        with np.errstate(all="ignore"):
+            met = values_of(graph, self._inputs(graph, rows, s, states), len(s)).T
+        return np.where((s == 1.0)[:, None], states, met)
+
+    def _polynomial(self, rows: Indices, s: Array) -> Array:
+        """States (k, m), not normalized between the ends."""
         assert self.dense is not None
         total, share = np.zeros((len(rows), self.x.shape[1])), s[:, None]
         for coefficients in self.dense[rows].swapaxes(0, 1)[::-1]:
             total += coefficients
             total *= share
-        inside = normalized(self.normalization, self.x_old[rows] + total, self.times_at(rows, s))
-        states: Array = np.where((s == 1.0)[:, None], self.x[rows], inside)
+        states: Array = np.where(share == 1.0, self.x[rows], self.x_old[rows] + total)
         return states
+
+    def _inputs(self, graph: Graph, rows: Indices, s: Array, states: Array) -> list[Array]:
+        """The inputs of a normalization: states, and t where it takes it."""
+        return [*states.T, self.times_at(rows, s)][: len(graph.inputs)]
 
     def at(self, times: Array) -> Array:
         """States (k, m) at times (k,) of these steps."""
@@ -70,16 +81,15 @@ class StepBlock(NamedTuple):
     def slopes_at(self, rows: Indices, s: Array) -> Array:
         """Derivatives of the states by the share, (k, m)."""
         assert self.dense is not None
-        total, share = np.zeros((len(rows), self.x.shape[1])), s[:, None]
+        total, graph = np.zeros((len(rows), self.x.shape[1])), self.normalization
         for k, coefficients in reversed(list(enumerate(self.dense[rows].swapaxes(0, 1), 1))):
-            total *= share
+            total *= s[:, None]
             total += k * coefficients
-        if self.normalization is None:
+        if graph is None:
             return total
-        between = self._replace(normalization=None).states_at(rows, s)
-        inputs = [*_with_time(self.normalization, between, self.times_at(rows, s)), *total.T]
+        inputs = [*self._inputs(graph, rows, s, self._polynomial(rows, s)), *total.T]
         with np.errstate(all="ignore"):
-            return values_of(_tangent(self.normalization, self.x.shape[1]), inputs, len(s)).T
+            return values_of(_tangent(graph, self.x.shape[1]), inputs, len(s)).T
 
     def rounding(self, rows: Indices, t: Array, x: Array) -> tuple[Array, Array]:
         """Rounding errors, (k, m), of states x (k, m) in these steps, and of the times t (k,)."""
@@ -88,28 +98,14 @@ class StepBlock(NamedTuple):
 
     def part(self, which: slice) -> StepBlock:
         """Subset of the steps."""
-        dense = None if self.dense is None else self.dense[which]
-        t, x, t_old, h, x_old = (array[which] for array in (self.t, self.x, self.t_old, self.h, self.x_old))
-        return StepBlock(t, x, t_old, h, x_old, dense, self.normalization)
+        arrays = {name: array[which] for name, array in self._arrays().items()}
+        return self._replace(**arrays)  # type: ignore[arg-type]
 
     def ending(self, t: float, x: Array) -> StepBlock:
         """The steps, the last of which ends at an instant inside it."""
         cut = self._replace(t=self.t.copy(), x=self.x.copy())
         cut.t[-1:], cut.x[-1:] = t, x
         return cut
-
-
-def normalized(normalization: Graph | None, states: Array, times: Array) -> Array:
-    """States (T, m) at the times (T,) with the constraints of the coordinates met."""
-    if normalization is None:
-        return states
-    with np.errstate(all="ignore"):
-        return values_of(normalization, _with_time(normalization, states, times), len(states)).T
-
-
-def _with_time(normalization: Graph, states: Array, times: Array) -> list[Array]:
-    """The inputs of a normalization: states, and t where it takes it."""
-    return [*states.T, times][: len(normalization.inputs)]
 
 
 @kept_by_first
@@ -119,7 +115,7 @@ def _tangent(graph: Graph, m: int) -> Graph:
 
 
 @kept_by_first
-def _compiled(rate: Graph) -> Compiled:
+def _compiled(rate: Graph) -> cg.Compiled:
     """The rate, for states at many times."""
     return cg.compile(rate)
 
@@ -131,17 +127,14 @@ def inside_nodes(order: int) -> Array:
 
 
 def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float], inside: Array) -> StepBlock:
-    """The steps with dense output where the method has none: the polynomial through states and rates.
-
-    They are those at both ends, and inside, (k, T, m), at `inside_nodes`.
-    """
-    f, shares = _compiled(rate), np.concatenate([[0.0], inside_nodes(2 * len(inside) + 2), [1.0]])
+    """The steps with the polynomial through states and rates at both ends, and inside, (k, T, m), at `inside_nodes`."""
+    shares = np.concatenate([[0.0], inside_nodes(2 * len(inside) + 2), [1.0]])
     states = np.stack([block.x_old, *inside, block.x])
     times = block.t_old + shares[:, None] * block.h
     times[-1] = block.t
     p = np.tile(np.reshape(parameters, (-1, 1)), times.size)
-    rates = f.batch(np.concatenate([states.reshape(-1, states.shape[2]).T, times.reshape(1, -1), p])).T
-    slopes = block.h[:, None] * rates.reshape(states.shape)
+    points = np.concatenate([states.reshape(-1, states.shape[2]).T, times.reshape(1, -1), p])
+    slopes = block.h[:, None] * _compiled(rate).batch(points).T.reshape(states.shape)
     powers = np.arange(1, 2 * len(shares))
     matrix = np.concatenate([shares[1:, None] ** powers, powers * shares[:, None] ** (powers - 1)])
     known = np.concatenate([states[1:] - states[0], slopes])
@@ -151,10 +144,7 @@ def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float], ins
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The state at any time of a run that began with x at t0 and made these steps; the first nq numbers of it are q.
-
-    velocities: qd of states (q, p), see Problem.
-    """
+    """The state at any time of a run from x at t0; the first nq numbers are q, velocities gives qd of (q, p)."""
 
     t0: float
     x: Array

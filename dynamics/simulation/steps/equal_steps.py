@@ -39,15 +39,11 @@ def equal_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
 
 
 def _divided(begin: float, end: float, count: int) -> EqualSteps:
-    """So many steps from begin to end."""
     return EqualSteps(begin, (end - begin) / count, count, end)
 
 
 def even_steps(instants: Sequence[float], dt: float) -> tuple[list[EqualSteps], Numbers]:
-    """Equal steps as of `equal_steps`, with instants that are evenly spaced, to rounding, in one stretch.
-
-    With them, how many are done at the instants.
-    """
+    """Equal steps with instants that are evenly spaced, to rounding, in one stretch; and how many are done at them."""
     times = np.array(instants)
     gaps, ulps = np.diff(times), np.spacing(np.maximum(np.abs(times[:-1]), np.abs(times[1:])))
     breaks = np.flatnonzero(np.abs(np.diff(gaps)) > EVEN * ulps[1:]) + 1
@@ -68,10 +64,7 @@ def even_steps(instants: Sequence[float], dt: float) -> tuple[list[EqualSteps], 
 
 
 def sampled_numbers(steps: int, every: int, most: int) -> Numbers:
-    """0, so many steps, and between them multiples of `every`: all, or of more than `most` some.
-
-    Half of these are spread over the run, unevenly, and half are denser toward its start, for it may end early.
-    """
+    """0, steps, and multiples of `every` inside, `most` of them: half uneven over the run, half denser at its start."""
     count = steps // every
     chosen = np.arange(1.0, min(count, most) + 1.0)
     if count > most:
@@ -90,10 +83,7 @@ def instants_of(stretches: Sequence[EqualSteps], numbers: Numbers) -> Array:
 
 
 def longer_steps(t: Array, numbers: Numbers, times: int) -> tuple[list[EqualSteps], Numbers]:
-    """Steps so many times as long as those of which so many are done at instants; and how many of them are done there.
-
-    Between two instants they are equal, and in all to the last if there are as many.
-    """
+    """Steps some times as long as those of which so many are done at t; and how many of them are done there."""
     counts = np.maximum(1, np.rint(np.diff(numbers) / times)).astype(np.int64)
     h, done = np.diff(t) / counts, np.append(0, np.cumsum(counts))
     new = np.flatnonzero(~(np.abs(np.diff(h, prepend=math.inf)) <= ALIKE * np.abs(h))).tolist()

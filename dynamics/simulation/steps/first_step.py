@@ -1,10 +1,9 @@
 """First step: how long it is, and the sizes of the state by which errors are measured, as statements of a program.
 
-A run writes x, t, p, sized and registers of the start, see `given`. Before its own first trial the program then looks
-ahead by Euler's steps, where it is `sized`, for the tolerance that goes with the sizes of the state to come; and tries
-steps with a tolerance that anything meets, each whole (`search` = 3) and as two halves (2, 1), until these confirm it;
-and so on in `ROUNDS`, as long as the look ahead went much farther than the step. A method that `starts` by itself has
-neither: its first trial is as long as it wishes, and sizes are looked at as soon as there are others than the start's.
+Before its own first trial a run looks ahead by Euler's steps, where it is `sized`, for the tolerance that goes with the
+sizes of the state to come; tries steps with a tolerance that anything meets, each whole (`search` = 3) and as two
+halves (2, 1), until these confirm it; and so on in `ROUNDS`, as long as the look ahead went much farther than the step.
+A method that `starts` has neither.
 """
 
 from __future__ import annotations
@@ -17,15 +16,17 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Node
+from cgraph._shared import with_names
 from cgraph.extend import STATEMENTS, Call, If, Program, Statement, While, copied
 
 from ...integrators import Problem
 from ...integrators.step import Values, call, each, lengths_of, total
 from ...integrators.step_control import COLLAPSE, RESOLUTION, SMALLEST_ATOL, registers
-from .state_sizes import OTHERS, StateKinds, at_rest, at_rest_registers
+from .state_sizes import OTHERS, StateKinds
 
 START = "start."  # before the names of its own registers, so that no method has to keep clear of them
-GIVEN = "t_end goal relative longest_step first instant begins".split()  # those that a run writes
+# Those that a run writes: its end, where its steps end first, rtol, limit, first step or 0, what moves the time.
+GIVEN = "t_end goal relative longest_step first instant begins".split()
 TOLERANCE = f"{START}tolerance"  # the register of atol
 LEAP = 1e-2  # of the whole run: the first step that is tried
 TRIALS = 60.0  # of a first step
@@ -37,15 +38,12 @@ JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take,
 SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it by more
 FIRST_LOOK = 32.0  # trials, after which atol is raised to the sizes so far; then after twice as many
 AT_ONCE = 1.0  # the same where no look ahead has found sizes
+STILL = 2.0**-54  # of a coordinate, a quarter of its last digit: a step that moves it by less does not move it
 WHOLE, FIRST_HALF, SECOND_HALF = 3.0, 2.0, 1.0  # register `search`
 
 
 def given(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of registers with which a run begins, besides x, t, p and sized.
-
-    t_end, goal: its end, and where its steps end first.  relative, tolerance: rtol and atol.  longest_step: the limit.
-    first: a first step, 0 without one.  instant: what moves the time.
-    """
+    """Registers with which a run begins, besides x, t, p and sized: `GIVEN` and tolerance, its atol."""
     return {f"{START}{name}": value for name, value in {**values, "begins": 1.0}.items()} | {"anew": 1.0}
 
 
@@ -55,58 +53,41 @@ def instant(t0: float, t_end: float) -> float:
 
 
 def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: int, *, starts: bool) -> Program:
-    """Chosen steps, of a method of this order, with the first one and the tolerances of a run that was given none.
-
-    starts: whether the method needs no search for it, see `Method`.
-    """
+    """Chosen steps, of a method of this order, with the first one and the tolerances of a run that was given none."""
     tolerance, after = _tolerance(kinds), list[Statement]()
     if starts:  # the first trial is as long as the method wishes, by sizes of the start alone
-        wish = call(lambda first, length: {"h_next": cg.where(first, first, length), "search": 0.0})
+        nothing = {"search": 0.0, "longest_next": 0.0}
+        wish = call(lambda first, length: {"h_next": cg.where(first, first, length), **nothing})
         sizes = If("sized", (each(lambda x_start: {"size": _size(x_start)}), *tolerance))
         found = [If("begins", (copied("x", "x_start"), begin, wish, sizes))]
     else:
-        begins = If("begins", (copied("x", "x_start"), begin, *_rates_at_start(problem, kinds)))
-        found = [begins, _look(problem, kinds, tolerance)]
+        begins = If("begins", (copied("x", "x_start"), begin, _rate(problem, "x", "t", "rate_start")))
+        found = [begins, If("look", (If("sized", _look(problem, kinds, tolerance)), searched))]
         after.append(If("search", _turn(problem.size, order), seldom=True))
     later = call(lambda seen: {"seen": 2.0 * seen, "due": 0.0})
-    raised = (*tolerance, *at_rest(kinds), copied("tolerance", "atol"), later)
+    raised = (*tolerance, *_at_rest(kinds), copied("tolerance", "atol"), later)
+    larger = each(lambda size, x: {"size": cg.maximum(size, _size(x))})
     after += [If("row", (larger,)), If("due", raised, seldom=True)]
     before = [If("anew", (*found, *_set_out(problem, AT_ONCE if starts else FIRST_LOOK)), seldom=True)]
     first, last = (_of_start(part, {*registers(problem), "farthest"}) for part in (before, after))
-    known = {**steps.registers, **at_rest_registers(kinds), **{f"{START}{name}": 1 for name in GIVEN}}
+    known = {**steps.registers, **{f"{START}{name}": 1 for name in GIVEN}}
     return replace(steps, registers=lengths_of([*first, *last], known), body=[*first, *steps.body, *last])
 
 
 def _of_start(statements: Sequence[Statement], shared: Collection[str]) -> tuple[Statement, ...]:
     """The statements, whose registers but the shared ones are those of the start."""
-
-    def named(name: str) -> str:
-        return name if name in shared or "." in name else f"{START}{name}"
-
     result = []
     for statement in statements:
         row = STATEMENTS[type(statement)]
-        changed: dict[str, Any] = {body: _of_start(getattr(statement, body), shared) for body in row.bodies}
-        for field in (*row.reads, *row.writes):
-            names = getattr(statement, field)
-            changed[field] = named(names) if isinstance(names, str) else tuple([named(name) for name in names])
-        result.append(replace(statement, **changed))  # type: ignore[type-var]
+        bodies: dict[str, Any] = {body: _of_start(getattr(statement, body), shared) for body in row.bodies}
+        fields = dict.fromkeys([*row.reads, *row.writes])
+        named = with_names(statement, fields, lambda name: name if name in shared else f"{START}{name}")
+        result.append(replace(named, **bodies))  # type: ignore[type-var]
     return tuple(result)
 
 
 def _size(x: Node) -> Node:
     return cg.where(abs(x) < math.inf, abs(x), 0.0)
-
-
-@each
-def larger(size: Node, x: Node) -> Values:
-    """The largest size so far."""
-    return {"size": cg.maximum(size, _size(x))}
-
-
-def _largest(kinds: StateKinds, source: str, target: str) -> Call:
-    """Largest size among components of one kind, for each component."""
-    return Call(kinds.largest, (source,), (target,))
 
 
 def _rate(problem: Problem, x: str, t: str, target: str) -> Call:
@@ -115,112 +96,105 @@ def _rate(problem: Problem, x: str, t: str, target: str) -> Call:
 
 
 def _tolerance(kinds: StateKinds) -> tuple[Statement, ...]:
-    """Register `tolerance`, in the units of the states, by the sizes so far.
-
-    rtol times the largest value that the component, or another of its group, has had, or a ten-thousandth of the
-    largest of its kind, coordinates or velocities, angles and lengths compared by their `lengths`.
-    """
+    """Register `tolerance` by the sizes so far: of the component or its group, or OTHERS of the largest of its kind."""
 
     def by_sizes(relative: Node, size: Node, kind: Node) -> Values:
         return {"tolerance": cg.maximum(relative * cg.maximum(size, OTHERS * kind), SMALLEST_ATOL)}
 
     grouped = () if kinds.together is None else (Call(kinds.together, ("size",), ("size",)),)
-    return (*grouped, _largest(kinds, "size", "kind"), each(by_sizes))
+    return (*grouped, Call(kinds.largest, ("size",), ("kind",)), each(by_sizes))
 
 
-def _first_try(length: Node, longest: Node, least: Node) -> Node:
-    return cg.maximum(LEAP * cg.minimum(length, longest), least)
+def _at_rest(kinds: StateKinds) -> list[Statement]:
+    """Raise the tolerance of velocities that in a mean step so far do not move any coordinate: they may be rounding."""
+
+    def still(resting: Node, kind: Node, mean: Node, coordinate: Node, relative: Node, length: Node) -> Values:
+        rests = (kind > 0.0) * (mean > 0.0) * (kind * mean <= STILL * coordinate)
+        return {"resting": cg.maximum(resting, cg.where(rests, relative * coordinate / length, 0.0))}
+
+    if not any(kinds.moved):
+        return []
+    return [
+        Call(kinds.coordinate, ("size",), ("coordinate",)),
+        call(lambda t, t0, trials: {"mean": abs(t - t0) / trials}),
+        each(still),
+        each(lambda tolerance, resting: {"tolerance": cg.maximum(tolerance, resting)}),
+    ]
 
 
 @call
-def begin(t: Node, t_end: Node, first: Node, sized: Node, longest_step: Node) -> Values:
-    """What a run begins with: whether to look ahead, to search, or to set out."""
+def begin(t: Node, t_end: Node, first: Node, longest_step: Node) -> Values:
+    """What a run begins with."""
     length = abs(t_end - t)
-    least = cg.minimum(length, cg.maximum(2.0 * RESOLUTION * abs(t), math.ulp(0.0)))
-    h_try = _first_try(length, longest_step, least)
+    h_first = LEAP * cg.minimum(length, longest_step)
     return {
         "t0": t,
         "length": length,
         "toward": cg.where(t_end > t, 1.0, -1.0),
-        "least": least,
-        "h_look": cg.where(first, first, LEAP * cg.minimum(length, longest_step)),
-        "look": sized,
-        "search": cg.where(cg.maximum(sized, first), 0.0, WHOLE),
-        "h_try": h_try,
-        "h_next": cg.where(first, first, h_try),
-        **dict.fromkeys("longest_next tested rounds begins jumps".split(), 0.0),
+        "least": cg.minimum(length, cg.maximum(2.0 * RESOLUTION * abs(t), math.ulp(0.0))),
+        "h_first": h_first,
+        "h_look": cg.where(first, first, h_first),
+        "look": 1.0,
+        **dict.fromkeys("rounds begins jumps reach".split(), 0.0),
     }
 
 
-def _rates_at_start(problem: Problem, kinds: StateKinds) -> list[Statement]:
-    """The rate at the start; of a force that jumps there, right after it: it changes in the first instant, no more."""
+def _jump(problem: Problem, kinds: StateKinds) -> list[Statement]:
+    """The rate to look ahead by: of a force that jumps at the start, and no more in the next instant, that after it."""
 
     def jumps(rate_start: Node, rate_ahead: Node, rate_before: Node, kind: Node, kind_ahead: Node) -> Values:
         least = SUDDEN * cg.maximum(kind, kind_ahead)
         return {"jumps": (abs(rate_ahead - rate_start) > least) * (abs(rate_before - rate_ahead) <= least)}
 
-    body: list[Statement] = [_rate(problem, "x", "t", "rate_start"), copied("rate_start", "rate_look")]
-    if problem.timed:
-        body += [
-            call(lambda t, toward, instant: {"t_ahead": t + toward * (1.0 * instant)}),
-            _rate(problem, "x", "t_ahead", "rate_ahead"),
-            call(lambda t, toward, instant: {"t_ahead": t + toward * (2.0 * instant)}),
-            _rate(problem, "x", "t_ahead", "rate_before"),
-            _largest(kinds, "rate_start", "kind"),
-            _largest(kinds, "rate_ahead", "kind_ahead"),
-            total(jumps),
-            If("jumps", (copied("rate_ahead", "rate_look"),)),
-        ]
-    return body
+    body: list[Statement] = [copied("rate_start", "rate_look")]
+    if not problem.timed:
+        return body
+    for k, target in ((1.0, "rate_ahead"), (2.0, "rate_before")):
+        ahead = call(lambda t, to, dt, k=k: {"t_ahead": t + to * (k * dt)}, "t0", "toward", "instant")
+        body += [ahead, _rate(problem, "x_start", "t_ahead", target)]
+    body += [Call(kinds.largest, ("rate_start",), ("kind",)), Call(kinds.largest, ("rate_ahead",), ("kind_ahead",))]
+    return [*body, total(jumps), If("jumps", (copied("rate_ahead", "rate_look"),))]
 
 
-def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -> If:
-    """The sizes of x and of where Euler's steps lead to, of h_look or of so much less that they can be trusted.
-
-    They move no kind of component by more than its size, and turn no kind of rate: it changes by no more than the
-    larger of before and after. `reach` is their length.
-    """
+def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -> tuple[Statement, ...]:
+    """The sizes of x and of where Euler's steps lead to, of h_look or as much less as can be trusted, `reach`."""
 
     def shorter(fine: Node, left: Node, reach: Node) -> Values:
         return {"left": (1.0 - fine) * (left - 1.0), "reach": cg.where(fine, reach, 0.25 * reach)}
-
-    def seen(jumps: Node, first: Node, reach: Node, length: Node, longest_step: Node, least: Node) -> Values:
-        h_try = _first_try(length, longest_step, least)
-        return {
-            "look": 0.0,
-            "tested": 0.0,
-            "search": cg.where(cg.maximum(first, jumps), 0.0, WHOLE),
-            "h_try": h_try,
-            # halving steps only leads to a jump; step control passes it, as any later one
-            "h_next": cg.where(first, first, cg.where(jumps, reach, h_try)),
-            "longest_next": cg.maximum(first, reach),
-        }
 
     euler = (
         copied("x_start", "x_ahead"),
         copied("rate_look", "rate_ahead"),
         each(lambda x_start: {"size_ahead": _size(x_start)}),
-        call(lambda: {"going": 1.0, "turn": 0.0, "moving": 0.0, "moving1": 0.0, "moving2": 0.0}),
+        call(lambda: {"going": 1.0, **dict.fromkeys("turn moving moving1 moving2".split(), 0.0)}),
         While("going", _euler(problem, kinds)),
     )
-    return If(
-        "look",
-        (
-            _largest(kinds, "x_start", "kind"),
-            call(lambda h_look: {"reach": h_look, "left": HALVINGS}),
-            While("left", (*euler, call(shorter))),
-            each(lambda fine, size_ahead, x_start: {"size": cg.where(fine, size_ahead, _size(x_start))}),
-            *tolerance,
-            call(seen),
-        ),
+    return (
+        *_jump(problem, kinds),
+        Call(kinds.largest, ("x_start",), ("kind",)),
+        call(lambda h_look: {"reach": h_look, "left": HALVINGS}),
+        While("left", (*euler, call(shorter))),
+        each(lambda fine, size_ahead, x_start: {"size": cg.where(fine, size_ahead, _size(x_start))}),
+        *tolerance,
     )
+
+
+@call
+def searched(sized: Node, jumps: Node, first: Node, reach: Node, h_first: Node, least: Node) -> Values:
+    """Whether to search or to set out. Halving steps only leads to a jump; step control passes it, as any later one."""
+    h_try, jumps = cg.maximum(h_first, least), sized * jumps
+    return {
+        "look": 0.0,
+        "tested": 0.0,
+        "search": cg.where(cg.maximum(first, jumps), 0.0, WHOLE),
+        "h_try": h_try,
+        "h_next": cg.where(first, first, cg.where(jumps, reach, h_try)),
+        "longest_next": cg.where(sized, cg.maximum(first, reach), 0.0),
+    }
 
 
 def _euler(problem: Problem, kinds: StateKinds) -> tuple[Statement, ...]:
-    """One of Euler's steps; two of them, or as many as move all that moves, are `going`.
-
-    At rest each step may move one component more, the next of a chain; the first moves none where a force begins at 0.
-    """
+    """One of Euler's steps; two of them, or as many as move all that moves, are `going`, as of a chain at rest."""
 
     def doubtful(way: Node, kind: Node, change: Node, kind_before: Node, kind_ahead: Node) -> Values:
         near = cg.maximum(way <= kind, cg.equal(kind, 0.0))
@@ -231,21 +205,20 @@ def _euler(problem: Problem, kinds: StateKinds) -> tuple[Statement, ...]:
         more = cg.maximum(turn < 2.0, (moving < problem.size) * (moving > moving2))
         return {"fine": fine, "going": fine * more, "moving1": moving, "moving2": moving1}
 
-    change = each(lambda rate_ahead, rate_before: {"change": rate_ahead - rate_before})
     return (
         each(lambda x_ahead, toward, reach, rate_ahead: {"x_ahead": x_ahead + toward * reach * rate_ahead}),
         total(lambda x_ahead: {"moving": cg.not_equal(x_ahead, 0.0)}),
         copied("rate_ahead", "rate_before"),
-        _largest(kinds, "rate_ahead", "kind_before"),
+        Call(kinds.largest, ("rate_ahead",), ("kind_before",)),
         call(lambda t0, turn, toward, reach: {"t_ahead": t0 + (turn + 1.0) * (toward * reach), "turn": turn + 1.0}),
         _rate(problem, "x_ahead", "t_ahead", "rate_ahead"),
-        _largest(kinds, "rate_ahead", "kind_ahead"),
-        change,
-        _largest(kinds, "change", "change"),
-        replace(change, inputs=("x_ahead", "x_start"), outputs=("way",)),
-        _largest(kinds, "way", "way"),
+        Call(kinds.largest, ("rate_ahead",), ("kind_ahead",)),
+        each(lambda rate_ahead, rate_before: {"change": rate_ahead - rate_before}),
+        Call(kinds.largest, ("change",), ("change",)),
+        each(lambda x_ahead, x_start: {"way": x_ahead - x_start}),
+        Call(kinds.largest, ("way",), ("way",)),
         total(doubtful),
-        replace(larger, inputs=("size_ahead", "x_ahead"), outputs=("size_ahead",)),
+        each(lambda size_ahead, x_ahead: {"size_ahead": cg.maximum(size_ahead, _size(x_ahead))}),
         call(counted),
     )
 
@@ -253,11 +226,10 @@ def _euler(problem: Problem, kinds: StateKinds) -> tuple[Statement, ...]:
 def _set_out(problem: Problem, first_look: float) -> list[Statement]:
     """The next trial is from the start: one of the search, with a tolerance that anything meets, or the first."""
 
-    def limits(search: Node, *others: Node) -> Values:
-        t0, goal, toward, length, h_next, longest_next, relative, longest_step, sized = others
+    def limits(search: Node, t0: Node, goal: Node, toward: Node, length: Node, h_next: Node, *others: Node) -> Values:
+        longest_next, relative, longest_step, sized = others
         return {
-            "t": t0,
-            "t_old": t0,
+            **dict.fromkeys(("t", "t_old"), t0),
             "next": h_next,
             "end": cg.where(search, toward * math.inf, goal),
             "rtol": cg.where(search, HUGE, relative),
@@ -267,8 +239,7 @@ def _set_out(problem: Problem, first_look: float) -> list[Statement]:
             "longest": cg.where(search, 0.0, longest_next),
             "still": LEAP * length if problem.timed else math.inf,
             "error_old": cg.where(search, 1.0, 1e-4),
-            "fresh": 1.0,
-            "accepted": 1.0,
+            **dict.fromkeys(("fresh", "accepted"), 1.0),
             "seen": first_look,
             **dict.fromkeys("status rejected evaluations at_limit trials".split(), 0.0),
             **({} if problem.projection is None else {"farthest": 0.0}),
@@ -282,37 +253,35 @@ def _set_out(problem: Problem, first_look: float) -> list[Statement]:
 def _turn(m: int, order: int) -> tuple[Statement, ...]:
     """Turn of the search after a trial: the next one, or whether its step is confirmed.
 
-    The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the first
-    derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps, both the
-    whole and the half steps keep nothing: there the first rate points much farther than the step goes.
+    Estimates of embedded methods can vanish by symmetry, such as at rest, and whole and half steps keep nothing of a
+    layer that a method damps: there the first rate points farther.
     """
-
-    def arrived(search: Node, accepted: Node, x: Node, whole: Node) -> Values:
-        return {"whole": cg.where(cg.equal(search, WHOLE), cg.where(accepted, x, math.inf), whole)}
 
     def halves(search: Node, accepted: Node) -> Values:
         first = cg.equal(search, FIRST_HALF) * (1.0 - accepted)
         return {"halved": cg.maximum(cg.equal(search, SECOND_HALF), first)}
 
+    def arrived(search: Node, accepted: Node, x: Node, whole: Node) -> Values:
+        return {"whole": cg.where(cg.equal(search, WHOLE), cg.where(accepted, x, math.inf), whole)}
+
     def half(search: Node, h_try: Node) -> Values:
         ahead = {"next": 0.5 * h_try, "h_next": 0.5 * h_try}
         return {**ahead, "anew": cg.equal(search, WHOLE), "search": search - 1.0, "status": 0.0}
 
-    def scale(whole: Node, start: Node, tolerance: Node, relative: Node) -> Node:
-        return tolerance + relative * cg.maximum(abs(start), abs(whole))
+    def scale(whole: Node, x_start: Node, tolerance: Node, relative: Node) -> Values:
+        return {"scale": tolerance + relative * cg.maximum(abs(x_start), abs(whole))}
 
-    def squares(x: Node, accepted: Node, whole: Node, x_start: Node, tolerance: Node, relative: Node) -> Values:
-        change = (whole - cg.where(accepted, x, math.inf)) / scale(whole, x_start, tolerance, relative)
+    def squares(x: Node, accepted: Node, whole: Node, scale: Node) -> Values:
+        change = (whole - cg.where(accepted, x, math.inf)) / scale
         return {"squares": change * change}
 
-    def pointing(h_try: Node, rate: Node, whole: Node, start: Node, tolerance: Node, relative: Node) -> Values:
-        way = cg.maximum(abs(whole - start), scale(whole, start, tolerance, relative))
-        return {"pointing": h_try * abs(rate) / way}
+    def pointing(h_try: Node, rate_start: Node, whole: Node, x_start: Node, scale: Node) -> Values:
+        return {"pointing": h_try * abs(rate_start) / cg.maximum(abs(whole - x_start), scale)}
 
-    def confirmed(squares: Node, ahead: Node, h: Node, *others: Node) -> Values:
+    def confirmed(squares: Node, pointing: list[Node], h: Node, *others: Node) -> Values:
         """Whether two half steps confirm a step, their difference is within the tolerance, and the first rate, too."""
         least, tested, sized, rounds, h_look, reach = others
-        difference = cg.sqrt(squares / m)
+        difference, ahead = cg.sqrt(squares / m), reduce(cg.maximum, pointing)
         found = cg.maximum((difference <= 1.0) * (ahead <= AHEAD), h <= least)
         # of tolerances; below a rounding, as of a state that moves evenly, it does not limit the step
         factor = 0.9 * cg.maximum(difference, 1e-16) ** (-1.0 / (order + 1))
@@ -334,10 +303,6 @@ def _turn(m: int, order: int) -> tuple[Statement, ...]:
             "status": 0.0,
         }
 
-    judged = (
-        total(squares),
-        each(pointing, *"h_try rate_start whole x_start tolerance relative".split()),
-        call(lambda pointing: {"ahead": reduce(cg.maximum, pointing)}, pointing=m),
-        call(confirmed, *"squares ahead h_try least tested sized rounds h_look reach".split()),
-    )
+    names = "squares pointing h_try least tested sized rounds h_look reach".split()
+    judged = (each(scale), total(squares), each(pointing), call(confirmed, *names, pointing=m))
     return (call(halves), each(arrived), If("halved", judged, (call(half),)))

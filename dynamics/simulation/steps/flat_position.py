@@ -1,7 +1,6 @@
 """Flat positions: where the constraints of a linkage say less than elsewhere, so that it can go on in two ways.
 
-The motion may go smoothly through such a position. But what a state is off, its acceleration is by as much over the
-distance, and a state on the constraints is off by their rounding over it: steps by error come ever closer, or creep.
+Accelerations are off by what a state is off over the distance to one: steps by error come ever closer, or creep.
 """
 
 from __future__ import annotations
@@ -34,11 +33,7 @@ class FlatPosition:
         self._least, self._mark = self._singular(t, x)[0], (0, t)
 
     def reason(self, rows: Array, steps: int, way: float, longest: float) -> str:
-        """Reason to stop near a flat position, "" elsewhere.
-
-        rows: t, h, x and more of the steps since the last call.  steps: so far.  way: by how many tolerances of a step
-        constraints moved one so far, at most.  longest: step.
-        """
+        """Reason to stop near one, by rows (t, h, x, ..) of steps.  way: tolerances that constraints moved one by."""
         self._ends = rows[np.abs(rows[:, 1]).argsort()[:KEPT_STEPS], : 2 + len(self._components)].copy()
         t, (before, begin), text = float(rows[-1, 0]), self._mark, ""
         if steps >= before + CREEP:
@@ -56,13 +51,13 @@ class FlatPosition:
         if not lost:
             return ""
         _, shares, x = min(lost, key=lambda each: each[0])
-        taking_part = zip(self._rows.outputs, shares >= PART * shares.max(), strict=True)
-        rows = [repr(name) for name, part in taking_part if part]
-        place = ", ".join(
-            [f"{name} = {value:.6g}" for name, value in zip(self._components, x[: self._nq], strict=False)]
-        )
+        rows = [
+            f"{name!r}" for name, share in zip(self._rows.outputs, shares, strict=True) if share >= PART * shares.max()
+        ]
+        place = [f"{name} = {value:.6g}" for name, value in zip(self._components, x[: self._nq], strict=False)]
         verb = "says" if len(rows) == 1 else "say"
-        return f"; near by {' and '.join(rows)} {verb} nothing that the other constraints do not say: {place:.300}"
+        said = f"{' and '.join(rows)} {verb} nothing that the other constraints do not say"
+        return f"; near by {said}: {', '.join(place):.300}"
 
     def _singular(self, t: float, x: Array) -> tuple[float, Array]:
         """The least singular value of J beside the largest, and of how much of each row it is, (m,)."""

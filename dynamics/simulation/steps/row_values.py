@@ -24,10 +24,7 @@ def values_of(graph: Graph, inputs: Iterable[Any], *shape: int) -> Array:
 
 
 def converted(graph: Graph | None, times: ArrayLike, states: Array, parameters: ArrayLike = 0.0) -> Array:
-    """States (.., m) with what a graph gives of them in place of their last numbers, as qd of p; without one the same.
-
-    times, parameters: see `row_values`; parameters are 0 where they are forces that it does not depend on.
-    """
+    """States (.., m) with what a graph gives in place of their last numbers, as qd of p; without one the same."""
     if graph is None:
         return states
     last = row_values(graph, times, states, parameters)
@@ -35,10 +32,7 @@ def converted(graph: Graph | None, times: ArrayLike, states: Array, parameters: 
 
 
 def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayLike = ()) -> Array:
-    """The outputs (.., k) of a graph over the states, t and parameters, at states (.., m).
-
-    times: (..), or as many as go along the last axes.  parameters: (.., p) in the same way.
-    """
+    """Outputs (.., k) of a graph over states (.., m), t and parameters, of as many points as go along the last axes."""
     *shape, m = states.shape
     rows, t, count = states.reshape(-1, m), np.broadcast_to(times, shape).reshape(-1), len(graph.inputs) - m - 1
     held = np.broadcast_to(parameters, (*shape, count)).reshape(len(rows), count)
@@ -53,24 +47,17 @@ def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayL
 def origin(
     rate: Graph, times: Array, states: Array, held: ArrayLike, names: Mapping[str, str], beyond: float
 ) -> _shared.WhyNan:
-    """Where the first rate comes from that is not finite, or the first derivative of one.
-
-    rate: over the states, t and forces.  times: (T,).  states: (T, m).  held: forces, (T, p) or ().
-    beyond: the step [s] of a run that stopped at the last row, which is taken along the rate; 0 of one that did not.
-    """
-    forces = np.broadcast_to(held, (len(times), len(rate.inputs) - states.shape[1] - 1))
-    tried = [(times, states, forces)]
+    """Where the first rate, or slope of it, comes from that is not finite.  beyond: the step [s] that failed, or 0."""
+    m, forces = states.shape[1], np.broadcast_to(held, (len(times), len(rate.inputs) - states.shape[1] - 1))
+    tried = [np.column_stack([states, times, forces])]
     if beyond and len(times):
         direction = -1.0 if len(times) > 1 and times[-1] < times[0] else 1.0
-        slope = row_values(rate, times[-1:], states[-1:], forces[-1:])[0]
         ahead = direction * beyond * np.array([0.5, 1.0])
-        tried.append((times[-1] + ahead, states[-1] + ahead[:, None] * slope, np.repeat(forces[-1:], 2, axis=0)))
-    for graph in (rate, cg.jacobian(rate, list(rate.inputs[: states.shape[1]]))):
-        for t, rows, force in tried:
-            bad = np.flatnonzero(~np.isfinite(row_values(graph, t, rows, force)).all(axis=1))
-            if len(bad):
-                k = int(bad[0])
-                return cg.why_nan(
-                    rate, dict(zip(rate.input_names, [*rows[k], t[k], *force[k]], strict=True)), names=names
-                )
+        further = states[-1:] + ahead[:, None] * row_values(rate, times[-1:], states[-1:], forces[-1:])
+        tried.append(np.column_stack([further, times[-1] + ahead, np.repeat(forces[-1:], 2, axis=0)]))
+    for graph in (rate, cg.jacobian(rate, list(rate.inputs[:m]))):
+        for rows in tried:
+            values = row_values(graph, rows[:, m], rows[:, :m], rows[:, m + 1 :])
+            if len(bad := np.flatnonzero(~np.isfinite(values).all(axis=1))):
+                return cg.why_nan(rate, dict(zip(rate.input_names, rows[bad[0]], strict=True)), names=names)
     return _shared.WhyNan(rate)

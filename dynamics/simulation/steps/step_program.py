@@ -14,11 +14,10 @@ from cgraph._shared import kept_by_first, memo
 from cgraph.extend import Call, Factor, If, Program, Runner, Statement, runner
 
 from ...integrators import Method, Problem
-from ...integrators.jacobian_statements import prices
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
 from .first_step import with_first_step
-from .state_sizes import StateKinds
+from .state_sizes import StateKinds, state_kinds
 
 KEPT = 8  # programs from elsewhere that a process keeps ready
 
@@ -37,7 +36,7 @@ class StepProgram:
     dense: bool  # whether its record has dense output
     finest: float  # relative tolerance
     kinds: StateKinds
-    normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
+    normalization: Graph | None  # between steps, see Problem; with constraints and no parameters their projection
     nq: int  # coordinates in a state, which come first
     rows: Graph | None  # of chosen steps: see `constraint_rates`
 
@@ -69,19 +68,10 @@ class CompiledSteps:
         """LU factorizations in a trial of a step."""
         return sum(isinstance(statement, Factor) for statement in self.program.steps.statements())
 
-    @cached_property
-    def prices(self) -> tuple[float, float]:
-        """Prices of an evaluation of the Jacobian and of a factorization, in evaluations of the rate."""
-        return prices(self.program.steps, self.program.rate) if self.factorizations else (0.0, 0.0)
-
 
 @kept_by_first
 def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgram:
-    """The steps of a method on a problem, all graphs that they need derived; the problem keeps them.
-
-    dense: whether a method that chooses its steps records its dense output.
-    Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
-    """
+    """The steps of a method on a problem, all graphs derived; the problem keeps them.  dense: with dense output."""
     steps, kinds = _normalized(method.program(problem, dense), problem, method), state_kinds(problem)
     if method.adaptive:
         steps = with_first_step(steps, problem, kinds, method.order, starts=method.starts)
@@ -96,40 +86,14 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         dense and method.adaptive,
         method.finest,
         kinds,
-        between(problem),
+        problem.normalization if problem.projection is None or problem.parameters else problem.projection,
         problem.nq,
         constraint_rates(problem) if method.adaptive else None,
     )
 
 
-def state_kinds(problem: Problem) -> StateKinds:
-    """Components that can be compared.
-
-    Coordinates are a kind, and velocities; those of no known length are others, and so is a group of several
-    coordinates, such as a quaternion.
-    """
-    system, every = problem.system, tuple(range(problem.size))
-    lengths = tuple([size or 1.0 for size in problem.lengths])
-    if system is None:
-        return StateKinds(every, every, lengths, ordinary=True, moved=((),) * problem.size)
-    groups = [system.kinematics.groups.index(group) for group in system.kinematics.groups]  # by their first
-    alone = [group if groups.count(group) > 1 else None for group in groups] + [None] * system.n
-    kinds = [
-        (k < problem.nq, not size, group) for k, (size, group) in enumerate(zip(problem.lengths, alone, strict=True))
-    ]
-    alike = tuple([kinds.index(kind) for kind in kinds])
-    known = [bool(size) for size in problem.lengths]
-    moved = [tuple([j for j in every[: problem.nq] if known[j] == known[k]]) for k in every[problem.nq :]]
-    moved = [()] * problem.nq + ([()] * system.n if problem.momenta else moved)
-    return StateKinds(alike, (*groups, *every[problem.nq :]), lengths, ordinary=False, moved=tuple(moved))
-
-
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
-    """The steps with every state that a step arrives at normalized, so that errors do not add up along it.
-
-    Where there are constraints it is projected onto them, which normalizes it; of steps by error register `farthest`
-    tells how far, in tolerances.
-    """
+    """The steps, which normalize or project where they arrive; `farthest` tells how far, in tolerances."""
     if problem.projection is not None and method.adaptive:
         lengths = {**steps.registers, "onto": problem.size, "way": 1, "farthest": 1}
         onto = Call(problem.projection, ("x", "t", "p"), ("onto",))
@@ -144,13 +108,6 @@ def normalizing(problem: Problem, time: str) -> list[Statement]:
     if problem.projection is not None:
         return [Call(problem.projection, ("x", time, "p"), ("x",))]
     return [] if problem.normalization is None else [Call(problem.normalization, ("x",), ("x",))]
-
-
-def between(problem: Problem) -> Graph | None:
-    """Graph through which states between the ends of steps go: the projection where states and t are all it needs."""
-    if problem.projection is None or problem.parameters:
-        return problem.normalization
-    return problem.projection
 
 
 @kept_by_first

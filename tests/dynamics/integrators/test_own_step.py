@@ -45,7 +45,7 @@ def parabola(problem: Problem) -> Step:
 
 @pytest.fixture(autouse=True)
 def own() -> Iterator[None]:
-    with registered(METHODS, **{OWN: Method(2, parabola, adaptive=True, degree=2), EQUAL: Method(2, parabola)}):
+    with registered(METHODS, **{OWN: Method(2, parabola, adaptive=True), EQUAL: Method(2, parabola)}):
         yield
 
 

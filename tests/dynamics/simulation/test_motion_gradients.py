@@ -30,7 +30,7 @@ DUAL = 1e-12  # of the size of the terms: a gradient beside forward sensitivitie
 DIFFERENCES = 2e-8  # central differences over 1e-5 of float64
 WRT = ["q", "qd", "tau", "m", "k"]
 USUAL = "rk4 dopri5 rodas radau verlet gauss4".split()
-OTHERS = [name for name in (*METHODS, "gauss8") if name not in USUAL]
+OTHERS = [name for name in METHODS if name not in USUAL]
 
 
 def bead(unit: float = 1.0) -> System:

@@ -141,7 +141,7 @@ def test_the_entries_of_a_quaternion_share_a_tolerance_which_a_place_does_not() 
         *[
             (
                 lambda method=method: dyn.simulate(top(), TURN, [0.0] * 3, 1.0, method),
-                "'top.wx' is the rate of no coord",
+                "with quasi-velocities does not have: take 'midpoint'",
             )
             for method in IN_TURN
         ],
