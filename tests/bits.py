@@ -1,7 +1,5 @@
 """The same bits: digests of one motion by every way in which its steps can be computed."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import pickle

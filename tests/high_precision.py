@@ -1,7 +1,5 @@
 """An independent evaluator: values and derivatives of a graph in mpmath, by operation name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import mpmath

@@ -1,7 +1,5 @@
 """Modules of `cg.to_js` run by Node.js where it is on PATH, else in V8 by mini-racer."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil

@@ -57,13 +57,6 @@ def convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
     """The sum over 0 < j < k of left_j right_k-j, of k - 1 > 0 factors each.
 
     What needs the coefficients just before comes last; of equal factors on both sides, each product is taken once.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import convolution
-    >>> left, right = cg.variables("a1 a2 a3"), cg.variables("b1 b2 b3")
-    >>> total = cg.Graph([*left, *right], {"sum": convolution(left, right)})
-    >>> total.evaluate({"a1": 1.0, "a2": 2.0, "a3": 3.0, "b1": 10.0, "b2": 100.0, "b3": 1000.0})
-    {'sum': 1230.0}
     """
     left, right = require_sequence("left", left, "nodes", Node), require_sequence("right", right, "nodes", Node)
     if not len(left) == len(right) > 0:

@@ -25,12 +25,6 @@ def ldl_solve(
     lower: the lower triangle of A by rows: row i has at least i + 1 entries.  check: append one more node: 0 where all
     pivots are positive, else 1 + the index of the first one eliminated that is not.
     Raises SingularError if a row has only zeros left, or with `check` a pivot is a constant that is not positive.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import ldl_solve
-    >>> from cgraph.extend import as_node
-    >>> ldl_solve([[as_node(4.0)], [as_node(2.0), as_node(2.0)]], [as_node(10.0), as_node(6.0)])
-    [<node 2.0>, <node 1.0>]
     """
     _require_triangle(lower, rhs)
     unknowns = [variable(f"unknown{i}#") for i in range(len(rhs))]
@@ -66,10 +60,6 @@ def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[object]) -> tu
 
     lower: the lower triangle of the symmetric A by rows: row i has at least i + 1 entries. Arrays, symbols and other
     types with arithmetic count as numbers.
-
-    >>> from cgraph.autodiff.ldl_solve import ldl_elimination
-    >>> ldl_elimination([[4.0], [2.0, 2.0]], [10.0, 6.0])
-    ([2.0, 1.0], [2.0, 2.0])
     """
     _require_triangle(lower, rhs)
     n = len(rhs)

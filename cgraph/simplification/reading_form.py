@@ -38,13 +38,6 @@ def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None, 
     ranks: {name of a variable: its rank}, 0 of what is not named. In a product numbers stand first, then parameters
     (0), coordinates (1), functions (2), and rates (3 and more), by which terms are collected; of one rank in the order
     of `ranks`.  largest: nodes of one that is written out, and of all four times as many.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import reading_form
-    >>> m, l, w = cg.variables("m l w")
-    >>> (y,) = reading_form([w * (l * (w * m)) * l + (-2.0) * m], {"m": 0, "l": 0, "w": 3})
-    >>> print(cg.latex(y))
-    m \, {l}^{2} \, {w}^{2} - 2 \, m
     """
     reader = _Reader(ranks or {}, largest)
     plain = reader.tidied(nodes)

@@ -52,15 +52,6 @@ def memo(size: int) -> Callable[[Callable[Arguments, Result]], Memo[Arguments, R
 
     Its arguments must be hashable, and those that are compared by identity are kept alive. docs/design.md lists every
     function that has it.  size: how many results are kept at most, the last ones used.
-
-    >>> from cgraph._shared import memo
-    >>> @memo(16)
-    ... def square(x):
-    ...     print("made")
-    ...     return x * x
-    >>> square(3.0), square(3.0)
-    made
-    (9.0, 9.0)
     """
 
     def decorate(function: Callable[Arguments, Result]) -> Memo[Arguments, Result]:
@@ -78,16 +69,6 @@ def kept_by_first(
 
     They go when that object goes, so the other arguments, hashable, should be few: flags, names, a method. The object
     is not altered, has a `__dict__` and can be referred to weakly.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import kept_by_first
-    >>> @kept_by_first
-    ... def pullback(graph):
-    ...     return cg.vjp(graph)
-    >>> x = cg.variable("x")
-    >>> graph = cg.Graph([x], {"y": x * x})
-    >>> pullback(graph) is pullback(graph)
-    True
     """
 
     @wraps(function)

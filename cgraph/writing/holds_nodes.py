@@ -25,18 +25,6 @@ class HoldsNodes:
     ------
     pickle.PicklingError
         When it is pickled, for a function that another process cannot find: a lambda, or one inside another.
-
-    Examples
-    --------
-    >>> import pickle
-    >>> import cgraph as cg
-    >>> from cgraph._shared import HoldsNodes
-    >>> class Spring(HoldsNodes):
-    ...     def __init__(self, force):
-    ...         self.force = force
-    >>> state = Spring(3.0 * cg.variable("x")).__reduce__()
-    >>> state[1][2]
-    <Graph (x) -> (0): 3 nodes, 2 edges>
     """
 
     def __getstate__(self) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Engines: those that are installed, the numbers at which they are looked at, and the bits of evaluation."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import random

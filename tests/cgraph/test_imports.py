@@ -1,7 +1,5 @@
 """What importing costs: a package loads NumPy and the standard library, a program what it uses."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Where the parts of a linkage are, how fast, and how far its loops are open: plain NumPy, apart from the library."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

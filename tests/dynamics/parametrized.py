@@ -1,7 +1,5 @@
 """Mechanisms whose numbers are replaced by parameters: names, variables, and formulas of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Textbook systems written from positions, as somebody would who differentiates them by the chain rule."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import cgraph as cg

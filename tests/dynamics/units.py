@@ -1,7 +1,5 @@
 """Mechanisms in other units of mass, length and time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The command line: what it prints, and one line for a user's mistake."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """Solving with a Hessian that is never formed, against Hessians by high-precision differences."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """`to_jax` and `as_jax`: values and derivatives in JAX, jitted and in batches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """`interp`: tables as functions, beside NumPy's and SciPy's, and alike on every back end."""
 
-from __future__ import annotations
-
 import math
 import re
 

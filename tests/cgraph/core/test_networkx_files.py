@@ -1,7 +1,5 @@
 """Graphs in the files of networkx: GraphML, GEXF and JSON give back the same graph."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

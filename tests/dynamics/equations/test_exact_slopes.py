@@ -1,7 +1,5 @@
 """Derivatives of random trees of bodies against 60 digits without graphs, and beside Pinocchio's errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NamedTuple

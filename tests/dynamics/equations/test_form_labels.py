@@ -1,7 +1,5 @@
 """What both forms of the equations of motion are called in parts: tags, roles, and classes by what needs a node."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import pytest

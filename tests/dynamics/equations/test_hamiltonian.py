@@ -1,7 +1,5 @@
 """Hamilton's equations: those of Lagrange in (q, p), the slopes of H, and what they say where there are none."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Velocities of momenta where L is not quadratic: those that the momenta are of, over all their sizes and units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

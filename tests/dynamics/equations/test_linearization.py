@@ -1,7 +1,5 @@
 """Linearization against differences of other programs' accelerations, Pinocchio's derivatives, and closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 from unittest.mock import patch
 

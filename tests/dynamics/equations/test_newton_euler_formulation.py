@@ -1,7 +1,5 @@
 """Inverse dynamics by velocities: trees of all joints and random Lagrangians, beside the chain rule in 60 digits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import cgraph as cg

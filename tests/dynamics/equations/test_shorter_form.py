@@ -1,7 +1,5 @@
 """Identities: what a scene does not need is seen, no digits are lost for it, and graphs are no longer than SymPy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Mass matrices that are not positive definite at one state: seen, and the coordinate named."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The linearization in (q, p): Hamilton's equations differentiated, and what their structure says of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

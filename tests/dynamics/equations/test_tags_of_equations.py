@@ -1,7 +1,5 @@
 """Tags on the equations of motion: every node says where it comes from, and gravity can be told from the rest."""
 
-from __future__ import annotations
-
 import pytest
 
 import cgraph as cg

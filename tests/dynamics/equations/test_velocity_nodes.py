@@ -1,7 +1,5 @@
 """Velocity nodes of a Lagrangian: which are recognized, that they are time derivatives, and the bias made of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Error and run time: errors are those of closed forms, orders are those declared."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

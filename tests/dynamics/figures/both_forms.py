@@ -5,8 +5,6 @@ python -m tests.dynamics.figures.both_forms linearizations   nodes and times of 
 python -m tests.dynamics.figures.both_forms orders           M^-1 tau by both orders of elimination: also steps by units
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial

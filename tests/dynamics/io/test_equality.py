@@ -1,7 +1,5 @@
 """Equality constraints of MJCF: the same rows and accelerations as MuJoCo's model has them, but exact; and the rest."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mechanisms read from MJCF: MuJoCo's own accelerations, the frames and defaults, and what is left out."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 from collections.abc import Iterator

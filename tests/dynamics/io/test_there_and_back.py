@@ -1,7 +1,5 @@
 """Mechanisms written and read again: random trees of any size and scale are the same, or are refused in a sentence."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from typing import Any

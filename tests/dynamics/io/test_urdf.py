@@ -1,7 +1,5 @@
 """Mechanisms read from URDF: numbers of the file, frames, what is left out, and a sentence for what is wrong."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Contacts: their laws, beside closed forms; action and reaction; units; smoothness; and what cannot be one."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Forces on bodies: virtual work by differences, what they are made of, and what cannot be one."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

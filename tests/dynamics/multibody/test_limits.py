@@ -1,7 +1,5 @@
 """Limits of joints as numbers: from files, to files, and where they are shown; beside MuJoCo's and Pinocchio's."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle

@@ -1,7 +1,5 @@
 """Loops: accelerations and loop forces against the equations that define them, in NumPy, from graphs of other parts."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Mechanisms: against MuJoCo, their counts, their tags, and what cannot be one."""
 
-from __future__ import annotations
-
 import re
 import sys
 import time

@@ -1,7 +1,5 @@
 """Operations of robots' equations: no row of the page grows, and published formulas are as they were printed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

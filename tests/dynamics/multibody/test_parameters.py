@@ -1,7 +1,5 @@
 """Parameters in place of numbers of bodies, joints and gravity: the same mechanism, with more inputs."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Every public function of a model, of one with a loop: of the whole, or of its tree, as its documentation says."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from dataclasses import replace

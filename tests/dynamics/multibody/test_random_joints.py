@@ -4,8 +4,6 @@ Every graph of a mechanism is held against the same tree with a chain of joints 
 joint, against Lagrange's equations by differences of the energies, and against the dense equations of M and the bias.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 

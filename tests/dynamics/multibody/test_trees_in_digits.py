@@ -1,7 +1,5 @@
 """Mass matrix, bias and accelerations of trees of bodies of every joint, beside 66 digits without graphs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

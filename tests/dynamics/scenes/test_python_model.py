@@ -1,7 +1,5 @@
 """Models of Python files and modules, by name, and what is said where there is none."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Scenes: by name, by file, and what neither can be."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

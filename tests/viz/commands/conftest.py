@@ -1,7 +1,5 @@
 """What a command prints, with its exit status checked."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 

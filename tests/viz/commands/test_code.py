@@ -1,7 +1,5 @@
 """`cgraph code`: files that compute the equations of a scene."""
 
-from __future__ import annotations
-
 import math
 import re
 import shutil

@@ -1,7 +1,5 @@
 """The inspector's page: self-contained, and its script computes what the library does."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """What the page's script computes, in V8: it is what the library computes, in one state for all versions."""
 
-from __future__ import annotations
-
 import math
 import re
 from functools import cache

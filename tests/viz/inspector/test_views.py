@@ -1,7 +1,5 @@
 """The views of one page in a browser: tabs, the address that says what is seen, robots of many limbs, the outline."""
 
-from __future__ import annotations
-
 import re
 from itertools import groupby
 from operator import itemgetter

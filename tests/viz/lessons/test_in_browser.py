@@ -1,7 +1,5 @@
 """The lesson in Chromium, where it and Playwright are there: keyboard, widths, dark, print, and a silent console."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

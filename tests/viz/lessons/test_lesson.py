@@ -1,7 +1,5 @@
 """Lessons: one template for any system, a page that stands alone and computes, a worksheet and its key."""
 
-from __future__ import annotations
-
 import html
 import json
 import re

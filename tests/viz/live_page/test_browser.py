@@ -1,7 +1,5 @@
 """The live motion in a browser, where Playwright and a Chromium are installed."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

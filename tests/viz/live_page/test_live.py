@@ -1,7 +1,5 @@
 """The live motion: its script in V8 computes what the library does; the page is one small strict file."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

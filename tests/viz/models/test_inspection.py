@@ -1,7 +1,5 @@
 """What there is to inspect in a scene, and where its joints are."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a notebook shows of results: HTML that holds what the text holds, pictures that fit, names that stay text."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from functools import cache

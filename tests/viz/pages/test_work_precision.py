@@ -1,7 +1,5 @@
 """Reports of integrators as pages: what was measured is shown, and a mistake costs a line."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

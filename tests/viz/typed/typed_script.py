@@ -1,7 +1,5 @@
 """The engine of the typed page in V8, without a browser."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from typing import Any
