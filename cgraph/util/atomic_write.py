@@ -12,11 +12,9 @@ from pathlib import Path
 
 
 def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> Path:
-    """Write a file whole or not at all, by way of a temporary file beside it; its path. Text is UTF-8.
+    """Write a file whole or not at all, by a temporary file beside it; its path. Text is UTF-8, links are followed.
 
-    A link is followed, and stays a link. Raises OSError with the path in its message, if the folder is missing or must
-    not be written to: what was at the path stays, and nothing else is left behind.
-    mode: permissions, less the process's umask: 0o600 keeps the file from others.
+    mode: permissions, less the process's umask.  Raises OSError with the path in its message; nothing is left behind.
     """
     write_files({Path(path): data}, mode=mode)
     return Path(path)
