@@ -80,16 +80,6 @@ def test_every_process_writes_the_same_texts():
     assert first.splitlines() == written("2").splitlines()
 
 
-def test_counts_are_exact():
-    counts = pendulum().counts()
-    assert (counts.nodes, counts.edges) == (11, 11)
-    assert counts.depth == 4  # cos, sub, mul, sub
-    assert counts.width == 5  # x, y, 0.5, 9.81, 1.0
-    assert counts.by_operation == {"constant": 3, "mul": 3, "sub": 2, "variable": 2, "cos": 1}
-    assert counts.by_tag == {"potential": 3, "kinetic": 2}
-    assert counts.by_role == {"primal": 6, "input": 2}
-
-
 def test_operations_are_counted_from_the_largest_and_then_by_name():
     counts = cg.Graph([x], {"f": cg.sin(x) + cg.cos(x) + cg.sin(x * 2)}).counts()
     assert list(counts.by_operation.items()) == [

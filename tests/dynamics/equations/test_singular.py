@@ -96,11 +96,6 @@ def test_the_first_of_thirty_that_fails_is_named_in_a_batch_with_its_state():
         assert system.coordinates[int(run(column)[-1]) - 1] == f"bead {name[1:]}"
 
 
-def test_without_asking_nothing_is_added():
-    arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
-    assert "info" not in forward_dynamics(arm).outputs
-
-
 def test_a_coordinate_without_inertia_is_an_error_at_once():
     system = dyn.System(lambda q, qd, t: 0.5 * qd[0] * qd[0] - qd[1] * qd[1], ["good", "bad"])
     assert len(forward_dynamics(system).outputs) == 2

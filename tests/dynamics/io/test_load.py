@@ -85,16 +85,11 @@ def mjcf(worldbody: str, rest: str = "") -> str:
 INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" fullinertia="0.3 0.4 0.5 0.01 0.02 -0.03"/>'
 HINGE = f'<body name="a"><joint name="j"/>{INERTIAL}</body>'
 
-# --- there and back
-
 
 def test_any_name_comes_back() -> None:
     names = ["a/b", 'say "hi"', "<&>"]
     mechanism = Mechanism([Body(name, Joint("revolute", (0, 1, 0)), mass=1.0, center=(1, 0, 0)) for name in names])
     assert [body.name for body in dyn.load_mjcf(dyn.to_mjcf(mechanism)).bodies] == names
-
-
-# --- frames and defaults
 
 
 def test_a_model_by_hand_agrees() -> None:
@@ -156,9 +151,6 @@ def test_names_are_mujoco_s_or_new_ones() -> None:
     )
     assert mechanism.system.coordinates == ("body 2", "x", "body 2'", "c'", "c")
     assert [body.name for body in mechanism.moving] == ["body 2", "body 2' x", "body 2'", "c", "d"]
-
-
-# --- sources
 
 
 def test_a_path_a_text_and_a_model_are_the_same(tmp_path: Path) -> None:
@@ -254,8 +246,6 @@ def test_more_copies_than_are_made_in_seconds_are_refused(count: tuple[str, ...]
     assert dyn.load_mjcf(text.replace(f'"{count[0]}"', '"3"')).coordinates == ("j",)
 
 
-# --- what is not modelled
-
 BALL = f'<body name="b"><joint name="ball" type="ball" stiffness="2"/>{INERTIAL}</body>'
 FREE = f'<body name="f" pos="0 0 2"><freejoint name="root"/>{INERTIAL}{HINGE}</body>'
 TENDON = '<tendon><fixed name="string" stiffness="3"><joint joint="j" coef="1"/></fixed></tendon>'
@@ -344,9 +334,6 @@ def test_what_acts_from_outside_is_left_out_with_a_warning_and_no_error() -> Non
     assert dyn.scenes.Scene("a", "", loaded, (0.0,), (0.0,), 1.0).left_out == loaded.left_out
 
 
-# --- odd numbers and warnings
-
-
 @mark.parametrize("number", ["nan", "inf"])
 @each_row("attribute", ["stiffness", "damping", "armature", "ref", "pos", "axis"])
 def test_a_number_that_is_not_finite_is_one_sentence(
@@ -373,9 +360,6 @@ def test_other_warnings_of_mujoco_are_python_s(monkeypatch: Any) -> None:
     with warns(UserWarning, match="^MuJoCo on the given text: this is odd$"):
         dyn.load_mjcf(mjcf(HINGE))
     assert mujoco.get_mju_user_warning() is before
-
-
-# --- models nobody here wrote
 
 
 def files() -> Iterator[Path]:

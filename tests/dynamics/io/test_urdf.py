@@ -61,9 +61,6 @@ def mass_matrix(mechanism: Mechanism) -> Array:
     return np.reshape(list(dyn.mass_matrix(mechanism).evaluate(at).values()), (n, n))
 
 
-# --- the numbers of the file
-
-
 def test_a_urdf_arm_is_what_it_says() -> None:
     """Its numbers put in by hand; the meshes are nowhere."""
     loaded = dyn.load_urdf(URDF)
@@ -141,9 +138,6 @@ def test_an_axis_that_is_not_written_is_x() -> None:
     assert np.asarray(loaded.moving[0].joint.axis).tolist() == [1.0, 0.0, 0.0]
 
 
-# --- beside other readers
-
-
 def random_urdf(rng: np.random.Generator, n: int, *, massless: bool = False) -> str:
     """A tree of n hinges, slides and welds, with every frame turned.  massless: some links that move have no mass."""
 
@@ -179,9 +173,6 @@ def test_mujoco_reads_the_same(seed: int) -> None:
         module.mj_inverse(mj, data)
         worst = max(worst, error(inverse(x.ravel()), data.qfrc_inverse[order]))
     assert worst < EQUATIONS
-
-
-# --- what is left out
 
 
 def test_what_acts_from_outside_is_left_out_with_a_warning() -> None:
@@ -307,8 +298,6 @@ def test_moments_that_rounding_makes_negative_are_zero_and_said(digits: int, uni
     assert kinds == {(False, False), (False, True), (True, True)}
 
 
-# --- joints that mimic others
-
 AXIS = '<axis xyz="0 1 0"/><origin xyz="0.1 0 0.2"/>'
 
 
@@ -380,8 +369,6 @@ def test_a_fixed_joint_that_mimics_another_stays_fixed_and_is_said() -> None:
     assert [loop.body for loop in loaded.loops] == ["inner"]
 
 
-# --- what is wrong
-
 HINGE = joint("j", "continuous", "base", "a", '<axis xyz="0 0 1"/>')
 A, BASE = link("a", 1.0, np.eye(3)), link("base")
 WRONG = [
@@ -443,9 +430,6 @@ def test_what_is_wrong_is_one_sentence(text: str, message: str, tmp_path: Path) 
     file.write_text(text)
     with raises(MechanismError, match=re.escape(str(file))):
         dyn.load_urdf(file)
-
-
-# --- sources
 
 
 @mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])

@@ -56,9 +56,6 @@ def work(graphs: list[cg.Graph], q: Array, value: Array, torque: Array, step: fl
     return np.array(rates)
 
 
-# --- by other means
-
-
 MODELS: dict[str, Callable[[], Mechanism]] = {name: lambda make=make: make(7) for name, make in FAMILIES.items()} | {
     "a turned slide across two axes": lambda: Mechanism(
         [Body("cart", Joint("prismatic", (1.0, 1.0, 0.0), orientation=from_quaternion([1, 2, 3, 4])), mass=1.0)]
@@ -93,9 +90,6 @@ def test_accelerations_take_the_force_that_torques_do() -> None:
     for method in ("auto", "recursive", "dense"):
         qdd = run(dyn.forward_dynamics(mechanism, method), given)
         assert error(run(dyn.inverse_dynamics(mechanism), given | {"qdd": qdd}), given["tau"]) < AGREEMENT
-
-
-# --- graphs
 
 
 def test_forces_are_tagged_with_their_body() -> None:
@@ -133,9 +127,6 @@ def test_bodies_and_forces_may_come_from_iterators() -> None:
     for each in (read, replace(read)):
         assert error(run(dyn.inverse_dynamics(each), given), run(dyn.inverse_dynamics(listed), given)) < ROUNDING
     assert len(read.bodies) == 3
-
-
-# --- what cannot be
 
 
 ROTOR = Mechanism([Body("rotor", Joint("revolute"), inertia=(1.0, 1.0, 1.0))])

@@ -40,9 +40,6 @@ def loaded(*arguments: Any, **options: Any) -> scenes.Scene:
     return scenes.load(*arguments, **options)
 
 
-# --- by name
-
-
 @each_row("name", scenes.names())
 def test_a_scene_is_called_by_its_name_and_starts_in_a_state_of_its_model(name: str) -> None:
     scene = scenes.load(name)
@@ -88,9 +85,6 @@ def test_what_is_neither_a_name_nor_a_file_is_named_with_the_scenes(name: Any) -
     )
     with raises(ValueError, match="^" + re.escape(message)):
         scenes.load(name)
-
-
-# --- by file
 
 
 @mark.parametrize("as_given", [str, Path])

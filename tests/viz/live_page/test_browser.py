@@ -126,12 +126,6 @@ def data(page):
     return page.evaluate("JSON.parse(document.getElementById('live-data').textContent)")
 
 
-@each_row("fragment", ["#live=%", "#live=", "#live=5", "#nothing", "#live=%7B%22dt%22%3A%22x%22%7D"])
-def test_a_link_that_says_nothing_opens_the_page_as_it_is(fragment, show):
-    page = show(fragment=fragment)
-    assert page.evaluate("[...live.machine.run]") == [each["value"] for each in data(page)["inputs"]]
-
-
 def test_it_is_used_by_keys_alone(show):
     page = show()
     page.keyboard.press("Tab")

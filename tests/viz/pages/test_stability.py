@@ -126,9 +126,3 @@ def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
     printed = capsys.readouterr()
     assert json.loads(printed.out)["sections"][0]["rows"][1]["verdict"] == "unexplained"
     assert "beyond its bound without a known reason: Kapitza's pendulum by euler" in printed.err
-
-
-@pytest.mark.slow
-def test_a_quick_report_succeeds(tmp_path: Path) -> None:
-    assert cli.main(["report", "--stability", "--quick", "--out", str(tmp_path)]) == 0
-    assert (tmp_path / "stability.html").stat().st_size > 100_000
