@@ -35,7 +35,6 @@ def loaded(program: str, folder: Path) -> dict[str, set[str]]:
 
 
 def roots(modules: set[str]) -> set[str]:
-    """Top-level packages of modules."""
     return {name.partition(".")[0] for name in modules}
 
 

@@ -42,7 +42,6 @@ def placed(mechanism: dyn.Mechanism, q: Array, qd: Array) -> dict[str, Placed]:
 
 
 def energies(mechanism: dyn.Mechanism, q: Array, qd: Array) -> tuple[float, float]:
-    """T and V."""
     kinetic = potential = 0.0
     parts = placed(mechanism, q, qd)
     for body in mechanism.bodies:

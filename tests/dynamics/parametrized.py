@@ -11,8 +11,6 @@ from dynamics.multibody.bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES
 
 
 class Replaced:
-    """Numbers replaced, and what they were."""
-
     def __init__(self, seed: int, share: float) -> None:
         self.rng, self.share = np.random.default_rng(seed), share
         self.values: dict[str, float] = {}

@@ -171,7 +171,6 @@ def test_pivots_that_are_zero_are_taken_in_pairs():
 
 
 def alike(inputs: list[cg.Node], carried: list[cg.Node], apart: list[cg.Node]) -> bool:
-    """Whether two lists of nodes have the same values."""
     graph = cg.Graph(inputs, {f"s{i}": node for i, node in enumerate([*carried, *apart])})
     found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, len(inputs)))
     return bool(found[: len(carried)] == pytest.approx(found[len(carried) :], rel=LONG_SUM))

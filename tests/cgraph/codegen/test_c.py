@@ -33,7 +33,6 @@ STRICT = ["-std=c99", *WARNINGS]
 
 
 def build(folder, sources, flags=("-O2",)):
-    """One shared library of several sources, loaded."""
     files = [str(source.write(folder)[0]) for source in sources]
     library = folder / f"{sources[0].name}.so"
     run([CC, *STRICT, *flags, "-shared", "-fPIC", *files, "-o", str(library), "-lm"])
@@ -47,7 +46,6 @@ def run(command):
 
 
 def called(library, name, graph, points):
-    """Rows of outputs at rows of inputs."""
     function = library[name]
     function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], None
     found = np.full((len(points), len(graph.outputs)), 123.0)

@@ -28,9 +28,6 @@ def function(backend):
     return cg.compile(GRAPH, backend)
 
 
-# What is given.
-
-
 POINT = np.array([0.25, -3.0, 1024.0])  # of a kind that float32 and integers hold, but for the first
 VIEWS = {
     "list": POINT.tolist(),
@@ -118,9 +115,6 @@ def test_options_and_numbers_of_threads_that_make_no_sense_are_told(backend):
             cg.compile(PAIR, backend, cache=cache)
 
 
-# What comes back.
-
-
 def test_outputs_share_memory_with_nothing():
     product = x * y
     graph = cg.Graph([x, y], {"p": product, "q": product, "x": x, "again": x, "c": cg.constant(2.0), "d": 2.0})
@@ -190,9 +184,6 @@ def test_a_cache_in_the_home_is_not_a_folder_called_tilde(backend, monkeypatch, 
         monkeypatch.setenv(name, str(tmp_path))
     assert cg.compile(PAIR, backend, cache="~/code").options["cache"] == str(tmp_path / "code")
     assert cg.clear_cache("~/code") == (backend == "llvm")
-
-
-# Arrays bound once.
 
 
 def test_a_bound_function_reads_and_writes_its_arrays(function):

@@ -54,9 +54,6 @@ class Kept:
         return self.cache.fetch(recipe, make)
 
 
-# An entry.
-
-
 def flipped(position):
     def damage(content):
         changed = bytearray(content)
@@ -214,16 +211,12 @@ def test_processes_and_threads_may_fill_one_folder_at_once(folder):
     assert len(entries(folder)) == len(list(folder.iterdir())) == 201
 
 
-# What is compiled.
-
-
 def graph(constant=2.5):
     x, y = cg.variables("x y")
     return cg.Graph([x, y], {"u": cg.sin(x) * cg.exp(-y) + x * y, "v": cg.atan2(x, y) * constant + x})
 
 
 def bits(function):
-    """The values at one point and at many, to the last bit."""
     return function(POINT).tobytes(), function.batch(POINTS).tobytes()
 
 

@@ -22,7 +22,6 @@ def chain(length: int) -> cg.Graph:
 
 
 def by_hand(length: int, x: float) -> tuple[float, float]:
-    """Value and derivative of the chain, by a loop."""
     slope = 1.0
     for _ in range(length):
         slope *= math.cos(x)

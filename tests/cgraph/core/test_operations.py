@@ -33,7 +33,6 @@ def graph_of(op: Op) -> cg.Graph:
 
 
 def at(graph: cg.Graph, *values: float) -> list[float]:
-    """The outputs with inputs given by position."""
     return list(graph.evaluate(dict(zip(graph.input_names, values, strict=True))).values())
 
 

@@ -168,14 +168,12 @@ def test_csv_and_json_hold_the_points(report: WorkPrecision) -> None:
 
 
 def exact_motion(found: AccuracyTask, digits: int) -> Reference:
-    """The task's own, at its times."""
     exact = found.solution(found.times, digits=digits)
     assert exact is not None
     return exact
 
 
 def task(name: str, **options: Any) -> tuple[AccuracyTask, ErrorMetrics, float]:
-    """A task with its exact motion, to twenty digits."""
     found = load(name, **options)
     metrics = ErrorMetrics(found, exact_motion(found, 20))
     return found, metrics, metrics.smallest

@@ -56,12 +56,10 @@ class Figure(NamedTuple):
 
     @property
     def head(self) -> tuple[str, ...]:
-        """Names of the columns of counts."""
         return (*self.sizes, *[f"{n} units" for n in self.units])
 
 
 def called(graph: Graph) -> Way:
-    """A bound call."""
     compiled = cg.compile(graph)
     return compiled.bind(_point(graph), np.empty(compiled.n_out)), 1
 
@@ -75,7 +73,6 @@ def looped(graph: Graph) -> Way:
 
 
 def batched(graph: Graph) -> Way:
-    """A batch of states."""
     compiled, out = cg.compile(graph), np.empty((len(graph.outputs), POINTS))
     aside = np.random.default_rng(1).uniform(-0.1, 0.1, (compiled.n_in, POINTS))
     points = np.ascontiguousarray(_point(graph)[:, np.newaxis] + aside)

@@ -53,7 +53,6 @@ def text_of(equality: str, option: str = "") -> str:
 
 
 def rows(model: Any, data: Any, q: Array) -> tuple[Array, Array]:
-    """MuJoCo's constraints and their Jacobian."""
     data.qpos[:] = q
     mujoco.mj_forward(model, data)
     return np.array(data.efc_pos), np.array(data.efc_J).reshape(-1, model.nv)

@@ -163,13 +163,9 @@ def test_a_path_a_text_and_a_model_are_the_same(tmp_path: Path) -> None:
 
 
 @mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
-def test_a_missing_file_is_named(load: Any, tmp_path: Path) -> None:
+def test_what_is_no_source_is_said(load: Any, tmp_path: Path) -> None:
     with raises(MechanismError, match=r"^there is no file '.*nowhere\.xml'$"):
         load(tmp_path / "nowhere.xml")
-
-
-@mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
-def test_what_is_no_source_is_said(load: Any) -> None:
     with raises(MechanismError, match=r"^a model is a path or XML text, and of MJCF an MjModel, too, got int$"):
         load(3)
 
@@ -260,14 +256,10 @@ NOT_MODELLED = [
 
 
 @each_row(("text", "what"), NOT_MODELLED)
-def test_what_is_not_modelled_is_refused_by_name(text: str, what: str) -> None:
+def test_what_is_not_modelled_is_refused_by_name_or_left_out_on_request(text: str, what: str) -> None:
     message = f"a mechanism cannot have {what} (the option ignore leaves this out)"
     with raises(MechanismError, match=f"^{re.escape(message)}$"):
         dyn.load_mjcf(text)
-
-
-@each_row(("text", "what"), NOT_MODELLED)
-def test_what_is_not_modelled_is_left_out_on_request(text: str, what: str) -> None:
     with warns(dyn.MechanismWarning, match=f"^the given text: left out {re.escape(what)}$"):
         mechanism = dyn.load_mjcf(text, ignore=True)
     assert mechanism.left_out == (what,)

@@ -35,14 +35,12 @@ ROBOT = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass v
 
 
 def compiled(flags: str = "", more: str = "") -> Any:
-    """MuJoCo's model of it, where there is MuJoCo."""
     mj = pytest.importorskip("mujoco").MjModel.from_xml_string(MODEL.format(flags=flags, more=more))
     mj.opt.disableactuator = 1 << 2
     return mj
 
 
 def silently(mj: Any, **options: Any) -> dyn.Mechanism:
-    """The mechanism, whatever is left out."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dyn.MechanismWarning)
         return dyn.load_mjcf(mj, **options)

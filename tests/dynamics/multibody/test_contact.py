@@ -22,7 +22,6 @@ RADIUS, MASS, GRAVITY = 0.1, 2.0, 9.81
 
 
 def ball(name: str = "ball", **others: Any) -> dyn.Body:
-    """A ball of even density, free."""
     moment = 0.4 * MASS * RADIUS**2
     return dyn.Body(name, dyn.Joint("free"), mass=MASS, inertia=(moment, moment, moment), **others)
 

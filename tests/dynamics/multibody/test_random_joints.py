@@ -175,7 +175,6 @@ def _state(given: Twins, seed: int) -> tuple[dict[str, Array], dict[str, Array]]
 
 
 def _values(graph: cg.Graph, state: dict[str, Array]) -> Array:
-    """All outputs in a row."""
     named = {f"{name}{k}": float(x) for name, row in state.items() for k, x in enumerate(row)}
     if "dt" in graph.input_names:  # embedded: with the state before
         old = {"q": state["q"] - 1e-3 * state["qd"], "qd": state["qd"] - 1e-3 * state["qdd"]}

@@ -25,8 +25,6 @@ URDF = """<?xml version="1.0" encoding="utf-8"?><robot name="arm"><link name="ba
 
 @pytest.fixture
 def file(tmp_path: Path) -> Any:
-    """Writes a text to a file of a name."""
-
     def write(text: str, name: str = "model.xml") -> Path:
         path = tmp_path / name
         path.write_text(text, encoding="utf-8")
@@ -129,10 +127,6 @@ def test_urdf_is_known_by_its_root_element(file: Any, name: str) -> None:
     assert loaded(file(URDF, name)).system.coordinates == ("j",)
 
 
-def test_mjcf_may_end_in_anything(file: Any) -> None:
-    assert loaded(file(MJCF, "model.mjcf")).system.n == 2
-
-
 def test_a_file_s_name_does_not_hide_a_scene(file: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     path = file(MJCF, "chain")
     monkeypatch.chdir(path.parent)
@@ -163,13 +157,6 @@ def test_a_file_that_is_no_model_is_one_sentence(file: Any, tmp_path: Path, text
     with raises(MechanismError, match="^" + re.escape(message.format(path=str(path)))) as caught:
         loaded(path)
     assert "\n" not in str(caught.value)
-
-
-def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    folder = tmp_path / "robots.xml"
-    folder.mkdir()
-    with raises(MechanismError, match=r"^'.*robots\.xml' is a folder, and a model is a file$"):
-        loaded(folder)
 
 
 def test_bytes_that_are_no_text_are_one_sentence(tmp_path: Path) -> None:

@@ -19,5 +19,4 @@ def said(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
 
 @pytest.fixture
 def figures(said: Callable[..., str]) -> Callable[..., dict]:
-    """What it prints as data."""
     return lambda *arguments, status=0: json.loads(said(*arguments, "--json", status=status))

@@ -39,9 +39,6 @@ def pendulum(tmp_path_factory) -> str:
     return out.read_text(encoding="utf-8")
 
 
-# What the file is.
-
-
 def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
     data = data_of(pendulum)
     names = [*[TITLES[name] for name in FORMULATIONS], "forward dynamics", "Hamilton's equations", "state equation"]

@@ -3,7 +3,6 @@
 import html
 import json
 import re
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,6 @@ import viz
 from cgraph.extend import OPS
 from dynamics.integrators import TABLEAUS
 from dynamics.scenes.scenes import of_model
-from tests.chromium import chromium
 from tests.each_row import each_row
 from tests.tolerances import EQUATIONS
 from tests.viz.lessons.systems import SYSTEMS, block
@@ -144,7 +142,6 @@ def test_a_chain_that_whips_is_watched_for_a_shorter_time():
 
 @pytest.fixture(scope="module")
 def v8():
-    """The page's script for numbers, in a browser's engine."""
     engine = pytest.importorskip("py_mini_racer").MiniRacer()
     engine.eval(module.scripts())
     return engine
@@ -232,26 +229,6 @@ def test_a_line_makes_the_pages(tmp_path, capsys, monkeypatch):
 def test_a_system_too_large_for_the_page_is_said_to_be(monkeypatch):
     monkeypatch.setattr("viz.lessons.subject.LARGEST_GRAPH", 5)
     assert "too large to be computed" in torque_parts(subject_of(dyn.scenes.load("spring_mass"))).to_html(3)
-
-
-def test_the_address_holds_the_score(tmp_path):
-    """In Chromium where there is one: screens, guesses and the score come from the fragment, and nothing goes wrong."""
-    if (program := chromium()) is None:
-        pytest.skip("no Chromium here")
-    page: Path = tmp_path / "lesson.html"
-    viz.lesson(block(), page)
-    run = subprocess.run(
-        [program, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}", "--v=0",
-         "--enable-logging=stderr", "--virtual-time-budget=2000", "--dump-dom", f"{page.as_uri()}#4;11-9"],
-        capture_output=True, encoding="utf-8", timeout=60, check=False,
-    )  # fmt: skip
-    assert "CONSOLE" not in run.stderr
-    dom = run.stdout
-    assert "1 of 2 right" in dom  # B is right on the first, wrong on the second; 9 is no choice
-    assert re.findall(r'<section class="screen current" id="([\w-]+)"', dom) == ["wrong-way"]
-    assert dom.count('<details class="reveal" open="">') == 2
-    assert re.search(r'<a href="#1"[^>]*class="right"', dom)
-    assert re.search(r'<a href="#2"[^>]*class="wrong"', dom)
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])

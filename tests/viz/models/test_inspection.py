@@ -148,11 +148,6 @@ def test_a_joint_turns_the_picture_one_way_or_the_other(axis, turns):
     assert skeleton(slide, q).turns == (0,)
 
 
-def test_a_time_out_of_range_is_refused():
-    with pytest.raises(ValueError, match="t_end"):
-        inspection(Scene("x", "", dyn.planar_arm([1.0], [1.0]), (0.0,), (0.0,), 1.0), t_end=-1.0)
-
-
 @stops
 def test_a_motion_that_does_not_begin_is_told():
     weightless = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 - q[0] ** 2, ["x"], {"m": 0.0})

@@ -51,7 +51,6 @@ CONTENT = {
 
 @pytest.fixture(scope="module")
 def document() -> Document:
-    """The document, drawn once."""
     return stability_page.document(CONTENT)
 
 

@@ -13,8 +13,6 @@ HOSTILE = "</script><script>alert(1)</script>"
 
 @pytest.fixture
 def show(visit, tmp_path):
-    """Open a page, by default the typed one."""
-
     def opened(text=None, fragment="", **options):
         path = tmp_path / "page.html"
         path.write_text(viz.typed_page() if text is None else text, encoding="utf-8")
@@ -24,7 +22,6 @@ def show(visit, tmp_path):
 
 
 def typed(page, text):
-    """Type it, and wait for the page's answer."""
     page.fill("#text", text)
     page.locator("#text").press("Control+Enter")
 

@@ -42,7 +42,6 @@ function outputsAt(graph, at) {
 
 @cache
 def machine() -> MiniRacer:
-    """V8 with the engine."""
     engine = MiniRacer()
     engine.eval(f"{script()}\n{HELPERS}")
     return engine
