@@ -192,10 +192,7 @@ draw chain --out a.dot --forward --formulation kinetic_only"""
         ("--foo", "there is no option '--foo': `cgraph` alone lists the commands"),
         ("version", "there is no command 'version': did you mean '--version'?"),
         ("Simulat", "there is no command 'Simulat': did you mean 'simulate'?"),
-        (
-            "simulate chain --tend 2",
-            "simulate: error: unrecognized arguments: --tend 2; did you mean '--t-end'?",
-        ),
+        ("simulate chain --tend 2", "simulate: error: unrecognized arguments: --tend 2; did you mean '--t-end'?"),
         ("draw chain --out=", "argument --out: expected the name of a file or folder, got ''"),
         ("simulate chain --csv=", "argument --csv: expected the name of a file or folder, got ''"),
         ("simulate chain --start q0", "got 'q0'; a start is such as q0=0.5,qd0=1, or all numbers of q and qd"),

@@ -66,12 +66,10 @@ def flipped(position):
 DAMAGE = {
     "checksum": flipped(5),
     "first byte": flipped(32),
-    "middle": flipped(700),
     "last byte": flipped(-1),
     "short": lambda content: content[:-1],
     "half": lambda content: content[: len(content) // 2],
     "checksum alone": lambda content: content[:32],
-    "part of a checksum": lambda content: content[:7],
     "empty": lambda _: b"",
     "long": lambda content: content + b"\0",
     "garbage": lambda _: bytes(range(256)) * 9,
@@ -273,12 +271,6 @@ def test_other_code_has_other_entries(folder):
         changed = graph() if options else graph(np.nextafter(2.5, 3.0))
         cg.compile(changed, "llvm", cache=folder, **options).batch(POINTS)
         assert len(entries(folder)) == 1 + len(HOSTS) + 2 * count, name
-
-
-def test_the_sign_of_a_zero_is_another_constant(folder):
-    x = cg.variable("x")
-    values = [cg.compile(cg.Graph([x], {"y": x * zero}), "llvm", cache=folder)([1.0])[0] for zero in (0.0, -0.0)]
-    assert np.signbit(values).tolist() == [False, True]
 
 
 def test_a_user_without_a_home_gets_a_warning(monkeypatch):

@@ -112,11 +112,7 @@ def test_the_branch_not_taken_weighs_nothing():
 @each_row(
     ("arguments", "error", "words"),
     [
-        (
-            ("h", "x"),
-            cg.GraphError,
-            r"is called 'h' \(inputs x, y, z; named nodes a; outputs f, g\)",
-        ),
+        (("h", "x"), cg.GraphError, r"is called 'h' \(inputs x, y, z; named nodes a; outputs f, g\)"),
         (("f", "w"), cg.GraphError, "nothing in the graph is called 'w'"),
         (("f", 3), TypeError, "input is given by its name or itself, got int: 3"),
         (("f", cg.variable("strange")), cg.GraphError, "<node variable strange> is not a node of the graph"),

@@ -8,15 +8,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from tests.dynamics.mechanisms import (
-    TREES,
-    Array,
-    floating,
-    random_mechanism,
-    random_state,
-    random_tree,
-    turned_arm,
-)
+from tests.dynamics.mechanisms import TREES, Array, floating, random_mechanism, random_state, random_tree, turned_arm
 from tests.dynamics.tree_in_digits import Slopes, digits, exactly, floats, slopes_in_digits
 from tests.slow import slow
 

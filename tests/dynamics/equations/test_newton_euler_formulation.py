@@ -5,10 +5,7 @@ from collections.abc import Mapping
 import cgraph as cg
 import dynamics as dyn
 from dynamics import Mechanism
-from tests.dynamics.mechanisms import (
-    TREES as MODELS,
-    random_state,
-)
+from tests.dynamics.mechanisms import TREES as MODELS, random_state
 from tests.high_precision import evaluate
 
 DIGITS = 60

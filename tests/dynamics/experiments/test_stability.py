@@ -209,11 +209,7 @@ ROWS = [
     result(measurement(2.0), reason="a reason " * 20, steps=10),
     result(measurement(math.nan), stopped="stopped at t = 1 s"),
     CaseResult(
-        "Sine and cosine",
-        "a name longer than a column of the table has room for",
-        "",
-        "llvm",
-        (measurement(0.1),),
+        "Sine and cosine", "a name longer than a column of the table has room for", "", "llvm", (measurement(0.1),)
     ),
 ]
 

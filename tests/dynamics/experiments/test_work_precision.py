@@ -16,15 +16,7 @@ from dynamics.experiments.accuracy_task import INTERVALS, AccuracyTask
 from dynamics.experiments.work_precision import measurement
 from dynamics.experiments.work_precision.measurement import FLOOR_ERROR, ErrorMetrics
 from dynamics.experiments.work_precision.named_tasks import load, names
-from dynamics.experiments.work_precision.trajectory_runs import (
-    CHOSEN,
-    EQUAL,
-    Ours,
-    Outcome,
-    Run,
-    Solver,
-    problem_of,
-)
+from dynamics.experiments.work_precision.trajectory_runs import CHOSEN, EQUAL, Ours, Outcome, Run, Solver, problem_of
 from dynamics.experiments.work_precision.work_precision import (
     Curve,
     Point,

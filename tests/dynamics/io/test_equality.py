@@ -107,10 +107,7 @@ def test_what_is_soft_inactive_or_off_is_said() -> None:
     joint, off = CONSTRAINTS["one joint"], GEAR.replace("/>", ' active="false"/>')
     with warns(dyn.MechanismWarning, match="left out softness of equality constraints"):
         loaded = dyn.load_mjcf(text_of(joint + off))
-    assert loaded.left_out == (
-        "softness of equality constraints (number 0)",
-        "inactive equality constraints (gear)",
-    )
+    assert loaded.left_out == ("softness of equality constraints (number 0)", "inactive equality constraints (gear)")
     assert len(loaded.loops) == 1
     none = dyn.load_mjcf(text_of(joint + off, '<option><flag equality="disable"/></option>'))
     assert (none.loops, none.left_out) == ((), ())

@@ -79,8 +79,7 @@ def test_what_is_taken_is_not_left_out_and_the_rest_is() -> None:
         "actuators that act with no input",
     ]
     with pytest.warns(
-        dyn.MechanismWarning,
-        match=r"left out contacts \(.*\); actuators that act with no input .memory",
+        dyn.MechanismWarning, match=r"left out contacts \(.*\); actuators that act with no input .memory"
     ):
         model = dyn.load_mjcf(mj, **SMOOTH)
     kinds = [type(force).__name__ for force in model.forces]

@@ -151,18 +151,9 @@ BAD: dict[str, tuple[Any, str]] = {
         "the force on body 'rotor': value must have three components, got (1, 0)",
     ),
     "text": ([Force("rotor", "fxy")], "the force on body 'rotor': value must have three components, got 'fxy'"),
-    "a number": (
-        [Force("rotor", torque=2.0)],
-        "the force on body 'rotor': torque must have three components, got 2.0",
-    ),
-    "infinite": (
-        [Force("rotor", (0, np.inf, 0))],
-        f"{COMPONENT.format('value')} got inf",
-    ),
-    "none": (
-        [Force("rotor", torque=(0, None, 0))],
-        f"{COMPONENT.format('torque')} got None",
-    ),
+    "a number": ([Force("rotor", torque=2.0)], "the force on body 'rotor': torque must have three components, got 2.0"),
+    "infinite": ([Force("rotor", (0, np.inf, 0))], f"{COMPONENT.format('value')} got inf"),
+    "none": ([Force("rotor", torque=(0, None, 0))], f"{COMPONENT.format('torque')} got None"),
 }
 
 

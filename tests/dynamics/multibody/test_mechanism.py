@@ -14,12 +14,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion, rotation, to_quaternion
-from tests.dynamics.mechanisms import (
-    FAMILIES,
-    random_body,
-    turned_arm,
-    turned_tree,
-)
+from tests.dynamics.mechanisms import FAMILIES, random_body, turned_arm, turned_tree
 from tests.dynamics.models import Array, error, run, states
 from tests.each_row import each_row
 from tests.tolerances import LAST_BITS, SOLVED

@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from tests.bench.speed.counts import (
-    QUANTITIES,
-    ROBOTS,
-    VARIANTS,
-    models,
-    operation_counts,
-    operations,
-)
+from tests.bench.speed.counts import QUANTITIES, ROBOTS, VARIANTS, models, operation_counts, operations
 from tests.each_row import each_row
 from tests.slow import slow
 from viz.paper.mechanisms import turned_arm

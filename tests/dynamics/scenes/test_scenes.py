@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest import mark, raises, warns
+from pytest import mark, raises
 
 import dynamics as dyn
 from dynamics import MechanismError, scenes
@@ -16,7 +16,6 @@ INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" diaginertia="0.3 0.4 0.5"/>'
 MJCF = f"""<?xml version="1.0"?><!-- a hinge and a slide --><mujoco><worldbody>
 <body name="a"><joint axis="0 1 0"/>{INERTIAL}
 <body name="b"><joint type="slide"/>{INERTIAL}</body></body></worldbody></mujoco>"""
-RUBBING = MJCF.replace('axis="0 1 0"', 'axis="0 1 0" frictionloss="0.1" range="-30 30"')
 URDF = """<?xml version="1.0" encoding="utf-8"?><robot name="arm"><link name="base"/><link name="a"><inertial>
 <origin xyz="0.1 0 0.2"/><mass value="1.5"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.15"/></inertial>
 <visual><geometry><mesh filename="package://nowhere/a.stl"/></geometry></visual></link>
@@ -132,13 +131,6 @@ def test_a_file_s_name_does_not_hide_a_scene(file: Any, monkeypatch: pytest.Monk
     monkeypatch.chdir(path.parent)
     assert scenes.load("chain").system.n == 10
     assert loaded("./chain").system.n == 2
-
-
-def test_what_acts_from_outside_is_left_out_and_said(file: Any) -> None:
-    with warns(dyn.MechanismWarning, match=r"model\.xml': left out joint limits \(of body 'a'\); friction loss \("):
-        scene = loaded(file(RUBBING))
-    assert [each.partition(" (")[0] for each in scene.left_out] == ["joint limits", "friction loss"]
-    assert scene.system.n == 2
 
 
 @each_row(

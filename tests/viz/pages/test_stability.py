@@ -27,12 +27,7 @@ def row(case: str, verdict: str, *figures: dict[str, Any], reason: str = "", sto
 
 ROWS = [
     row("Robertson", "meets", figure(1e-9, True), figure(0.5, True, "inf")),
-    row(
-        "a name that is longer than there is room for",
-        "limit",
-        figure(7.0, False),
-        reason="A known <reason>.",
-    ),
+    row("a name that is longer than there is room for", "limit", figure(7.0, False), reason="A known <reason>."),
     row("another", "limit", figure(8.0, False), reason="A known <reason>."),
     row("broken", "unexplained", figure("nan", False), stopped="stopped at t = 1 s"),
 ]
