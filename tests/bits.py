@@ -1,7 +1,5 @@
 """The same bits: digests of one motion by every way in which its steps can be computed."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import pickle
@@ -93,7 +91,6 @@ class Motion:
         return _run([sys.executable, "-c", code], asked, {"PYTHONPATH": path}).strip()
 
     def in_c(self, flags: tuple[str, ...] = FLAGS) -> str:
-        """By the C code of the state equation, compiled."""
         assert COMPILER is not None
         with tempfile.TemporaryDirectory() as folder:
             source, _ = cg.to_c(self.rate, "motion", {"rk4": RK4}, time=TIME).write(folder)
@@ -108,7 +105,6 @@ class Motion:
         return digest(np.array(rows))
 
     def in_javascript(self) -> str:
-        """By the module of a page."""
         text, x, rows = cg.to_js(self.rate, {"rk4": RK4}, time=TIME), self.start, []
         for _ in range(STEPS // EVERY):
             x = stepped_by_js(text, "rk4", x, STEP, EVERY)

@@ -127,7 +127,6 @@ def ctrl_c() -> Iterator[Callable[[float], threading.Timer]]:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    """A running Chromium."""
     api = pytest.importorskip("playwright.sync_api", reason="the browser extra has it")
     if (program := chromium()) is None:
         pytest.skip("there is no Chromium on PATH")

@@ -1,7 +1,5 @@
 """Checks of the rows of a table in one case, which tells all rows that fail."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps

@@ -1,7 +1,5 @@
 """An independent evaluator: values and derivatives of a graph in mpmath, by operation name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import mpmath
@@ -55,7 +53,6 @@ def node_values(graph: cg.Graph, values: Mapping[str, Number], digits: int = DIG
 
 
 def evaluate(graph: cg.Graph, values: Mapping[str, Number], digits: int = DIGITS) -> dict[str, mpf]:
-    """The outputs of the graph, to so many digits."""
     env = node_values(graph, values, digits)
     return {name: env[node] for name, node in graph.outputs.items()}
 

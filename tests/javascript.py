@@ -1,7 +1,5 @@
 """Modules of `cg.to_js` run by Node.js where it is on PATH, else in V8 by mini-racer."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil
@@ -38,7 +36,6 @@ def run_js(text: str, program: str) -> Any:
 
 
 def floats(found: Any) -> Any:
-    """Texts of numbers as numbers."""
     if isinstance(found, list):
         return [floats(each) for each in found]
     try:
@@ -56,5 +53,4 @@ def evaluated_by_js(text: str, points: Any) -> list[list[float]]:
 
 
 def stepped_by_js(text: str, method: str, start: list[float], h: float, n: int) -> list[float]:
-    """The inputs after n steps."""
     return run_js(text, f'module.steps["{method}"](Float64Array.from({start}), {h!r}, {n})')  # type: ignore[no-any-return]

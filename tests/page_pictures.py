@@ -78,7 +78,6 @@ def digest(file: Path) -> str:
 
 
 def run(name: str, folder: Path) -> None:
-    """The examples of a page."""
     result = run_examples(name, folder)
     if result.returncode:
         sys.exit(f"{name}: {result.stderr}")

@@ -1,7 +1,5 @@
 """The page's JavaScript in V8, without a browser: for tests of what it computes."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Rows of a reader's own in a table of the library, of methods or of types of joints, for as long as a test takes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

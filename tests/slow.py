@@ -1,7 +1,5 @@
 """Values of a parameter that only `-m slow` tries: the largest, and the rest of many."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from pytest import mark, param

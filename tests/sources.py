@@ -14,8 +14,6 @@ PACKAGES = ("cgraph", "dynamics", "viz")
 
 @dataclass(frozen=True)
 class Source:
-    """A file of the library."""
-
     file: str  # from the root of the checkout
 
     @cached_property
@@ -32,7 +30,6 @@ class Source:
 
     @property
     def module(self) -> str:
-        """Its dotted name."""
         return self.file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
     def imports(self, for_types: bool = True) -> Iterator[str]:

@@ -1,7 +1,5 @@
 """Hypothesis strategies: random expression graphs over every operation of the table, with values that stay finite."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any, NamedTuple

@@ -102,7 +102,6 @@ ARM = ([1.0, 2.0], [1.0, 0.7])
 
 
 def used() -> list[np.ndarray]:
-    """Results of much of the library, made of models of their own."""
     arm, q, qd = dyn.planar_arm(*ARM), [0.3, -0.4], [0.1, 0.2]
     pushed = dyn.with_controller(arm, lambda q, qd, t, p: [p["k"] * (0.5 - q[0]), -qd[1]], {"k": 2.0})
     rod = {"constraints": lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0}}
@@ -151,8 +150,6 @@ def test_what_somebody_has_goes_on_without_caches() -> None:
 
 
 class Owner:
-    """Something that keeps results."""
-
     def __init__(self, number: float) -> None:
         self.number = number
 

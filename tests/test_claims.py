@@ -1,7 +1,5 @@
 """The page of claims: each quick command prints what the page says, to the tolerance that it says."""
 
-from __future__ import annotations
-
 import math
 import re
 import shlex

@@ -2,8 +2,6 @@
 
 import pytest
 
-from tests.each_row import each_row
-
 pytest_plugins = ["pytester"]
 
 TABLE = """
@@ -28,8 +26,3 @@ def test_every_row_that_fails_is_told(pytester: pytest.Pytester) -> None:
     assert "(2, 3)" in text
     assert "(3, 4)" in text
     assert "('x', 3)" in text
-
-
-@each_row("number", [1, 2, 3])
-def test_rows_that_hold_pass(number: int) -> None:
-    assert number > 0

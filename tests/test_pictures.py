@@ -1,7 +1,5 @@
 """The pictures of the pages are those that their commands make now; `make pictures` makes them anew."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import subprocess

@@ -584,31 +584,13 @@ def said(function, *args, **named):
     return None
 
 
+GRAPH_ALONE = """compile gradient hessian jacobian jvp lint simplify sparsity structure_hash to_c to_casadi to_jax to_js
+    to_networkx vjp"""
 GRAPH_FIRST = [
-    (cg.compile, ()),
-    (cg.compare, (None,)),
-    (cg.gradient, ()),
-    (cg.hessian, ()),
-    (cg.hessian_solve, ([], [])),
-    (cg.jacobian, ()),
-    (cg.jvp, ()),
-    (cg.lint, ()),
-    (cg.simplify, ()),
-    (cg.sparsity, ()),
-    (cg.specialize, ({},)),
-    (cg.structure_hash, ()),
-    (cg.to_c, ()),
-    (cg.to_casadi, ()),
-    (cg.to_jax, ()),
-    (cg.to_js, ()),
-    (cg.to_networkx, ()),
-    (cg.vjp, ()),
-    (cg.why, ("y", "x")),
-    (cg.why_nan, ({},)),
-    (cg.why_not, ("y", "x")),
-    (dyn.spurious_nodes, ()),
-    (viz.page, ()),
-    (viz.to_dot, ()),
+    *[(function, ()) for function in (dyn.spurious_nodes, viz.page, viz.to_dot)],
+    *[(getattr(cg, name), ()) for name in GRAPH_ALONE.split()],
+    *[(function, ({},)) for function in (cg.compare, cg.specialize, cg.why_nan)],
+    *[(function, ("y", "x")) for function in (cg.hessian_solve, cg.why, cg.why_not)],
 ]
 
 

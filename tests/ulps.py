@@ -1,7 +1,5 @@
 """Distances between numbers in units of the last place, and values by mpmath to measure them from."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, NamedTuple
 

@@ -46,9 +46,7 @@ class Coloring(NamedTuple):
 def jacobian_coloring(entries: Pattern, lanes: int) -> Coloring:
     """The cheapest of some colorings of a Jacobian: of its columns, of its rows, and of both.
 
-    A few dense rows make all columns clash. With reverse sweeps for these, the columns of what is left need few colors
-    (Coleman and Verma 1998); so it is with dense columns. Cost: a sweep takes `lanes` directions at once, and whichever
-    way sweeps go, there is a part that no direction changes.
+    A few dense rows make all columns clash; reverse sweeps for these leave few colors (Coleman and Verma 1998).
     """
     m, n = entries.shape
     best, least = Coloring([NONE] * n, [NONE] * m, np.zeros(len(entries.rows), dtype=bool)), (math.inf, 0)

@@ -20,11 +20,10 @@ LANES = 8  # colors that cost one sweep
 
 
 class CompressedJacobian(NamedTuple):
-    """The Jacobian of a graph x (n) -> y (m), to be run as a loop over colors: columns that share no row have one
-    color.
+    """The Jacobian of x (n) -> y (m) as a loop over colors; columns that share no row have one color.
 
-    primal: x -> p, the values that the products need, once for all colors.  product: p and the number of a color -> the
-    sum of its columns, (m,).  entries: the sums, (m, colors) row by row -> the Jacobian, row by row.
+    primal: x -> p, once for all colors.  product: p and a color -> the sum of its columns, (m,).
+    entries: the sums, (m, colors) row by row -> the Jacobian, row by row.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import compressed_jacobian

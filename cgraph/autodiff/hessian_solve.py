@@ -150,14 +150,6 @@ def solve_tangents(
     """Tangents {z: (dz/dw) x} of the nodes z that f is made from, for the x of `solve_nodes`, which has them anyway.
 
     At w it is x itself; a product within a rotation may be left out. Arguments and errors are those of `solve_nodes`.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import solve_tangents
-    >>> v, tau = cg.variables("v tau")
-    >>> twice = 2.0 * v
-    >>> tangents = solve_tangents(0.125 * twice * twice, [v], [tau])
-    >>> tangents[v], tangents[twice]
-    (<node variable tau>, <node mul>)
     """
     return _solved(output, wrt, rhs, build or Builder(), {}, (), order).dots
 

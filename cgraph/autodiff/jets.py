@@ -30,19 +30,16 @@ class Jets(NamedTuple):
     """The Taylor coefficients of a solution, as graphs.
 
     start: (x, t, p) -> the rates (m), the zeros, and what decides the pieces.
-    order: (the rates before (m), unit, k, zeros, sums, sides) -> coefficients k of x (m), of the rates (m), of the left
-    and the right factors of the sums, and of what decides the pieces; they are of the time over the unit.
-    zeros, sums: how many numbers the orders hand on. Sum i of order k runs over 0 < j < k: left_i of order j times
-    right_i of order k - j.  safe: of each sum, whether zeros win in it over what is not finite.
-    pieces: the piecewise nodes of `start`, each chosen by its side, the sign of its first argument or of a difference
-    of two.
+    order: (the rates before (m), unit, k, zeros, sums, sides) -> coefficients k of x (m), of the rates (m), of both
+    factors of the sums, and of what decides the pieces, by time over the unit.
+    zeros, sums: how many numbers the orders hand on; sum i of order k is sum_{0<j<k} left_i[j] right_i[k - j].
+    safe: whether zeros win in a sum over infinities.  pieces: piecewise nodes of `start`, each chosen by a sign.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import jets
     >>> x = cg.variable("x")
-    >>> growth = jets(cg.Graph([x], {"rate": x * x}))
-    >>> growth.zeros, growth.sums
-    (1, 1)
+    >>> jets(cg.Graph([x], {"rate": x * x})).sums
+    1
     """
 
     start: Graph
@@ -54,10 +51,7 @@ class Jets(NamedTuple):
 
 
 def _convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
-    """The sum over 0 < j < k of left_j right_k-j; what needs the coefficients just before comes last.
-
-    Of equal factors on both sides, each product is taken once.
-    """
+    """The sum over 0 < j < k of left_j right_k-j; what needs the coefficients just before comes last."""
     products: list[Node] = [a * b for a, b in zip(left, reversed(right), strict=True)]
     if all(a is b for a, b in zip(left, right, strict=True)):
         half = len(products) // 2

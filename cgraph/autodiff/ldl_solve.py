@@ -18,19 +18,11 @@ def ldl_solve(
 ) -> list[Node]:
     """Nodes x with A x = rhs for a symmetric, definite A, by an LDL^T factorization.
 
-    Rows are eliminated from the last up: along a chain of bodies that is from the tip to the base, the order in which
-    pivots are articulated inertias. Structural zeros cost nothing. A row whose pivot is the constant zero waits, and
-    leaves with another if it has to, so that an indefinite A is solved with, too; other pivots are not looked at.
-
-    lower: the lower triangle of A by rows: row i has at least i + 1 entries.  check: append one more node: 0 where all
-    pivots are positive, else 1 + the index of the first one eliminated that is not.
-    Raises SingularError if a row has only zeros left, or with `check` a pivot is a constant that is not positive.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import ldl_solve
-    >>> from cgraph.extend import as_node
-    >>> ldl_solve([[as_node(4.0)], [as_node(2.0), as_node(2.0)]], [as_node(10.0), as_node(6.0)])
-    [<node 2.0>, <node 1.0>]
+    Rows are eliminated from the last up: for bodies from the tip to the base. Structural zeros cost nothing. A row
+    whose pivot is the constant zero waits, and leaves with another if it has to.
+    lower: row i of the lower triangle has at least i + 1 entries.  check: append a node: 0 where all pivots are
+    positive, else 1 + the index of the first that is not.
+    Raises SingularError if a row has only zeros left, or with `check` a constant pivot is not positive.
     """
     _require_triangle(lower, rhs)
     unknowns = [variable(f"unknown{i}#") for i in range(len(rhs))]
@@ -59,17 +51,10 @@ def _require_triangle(lower: Sequence[Sequence[object]], rhs: Sequence[object]) 
 
 @explain_failure
 def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[object]) -> tuple[list[Any], list[Any]]:
-    """The solution x of A x = rhs and the pivots of A, the diagonal of D, over any numbers with + - * /.
+    """The solution x of A x = rhs and the pivots of A, over any numbers with + - * /.
 
     For i = n - 1 .. 0:  g_ij = A_ij / A_ii,  A_jk -= g_ij A_ik,  b_j -= g_ij b_i  (j, k < i);
-    for i = 0 .. n - 1:  x_i = b_i / A_ii - sum_j g_ij x_j.
-
-    lower: the lower triangle of the symmetric A by rows: row i has at least i + 1 entries. Arrays, symbols and other
-    types with arithmetic count as numbers.
-
-    >>> from cgraph.autodiff.ldl_solve import ldl_elimination
-    >>> ldl_elimination([[4.0], [2.0, 2.0]], [10.0, 6.0])
-    ([2.0, 1.0], [2.0, 2.0])
+    for i = 0 .. n - 1:  x_i = b_i / A_ii - sum_j g_ij x_j.  Row i of `lower` has at least i + 1 entries.
     """
     _require_triangle(lower, rhs)
     n = len(rhs)

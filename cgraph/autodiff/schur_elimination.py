@@ -124,9 +124,8 @@ class EdgePushing(SymmetricElimination):
     def eliminate_sum(self, node: Node) -> None:
         """A sum z = p w + p' a with the only use of w, eliminated in place of w: the unknowns (w, a) become (z, a).
 
-        With w = p (z - p' a): b_z += p b_w, b_a -= p' p b_w, abar += p' zbar. Pushed to w and a first, W_zz would be in
-        the rows of both, for the elimination of w to take out of a's again: a difference in which nothing is left
-        where W_zz is much larger than the part of W_aa that does not come from z.
+        With w = p (z - p' a): b_z += p b_w, b_a -= p' p b_w, abar += p' zbar. Pushed to w and a first, W_zz would leave
+        the rows of both as a difference in which digits are lost.
         """
         variable, other, p, p_other = self.sums[node]
         bar, at_variable = self.bars.pop(node, ZERO), p * self.rhs[variable]

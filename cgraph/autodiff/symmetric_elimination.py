@@ -115,9 +115,8 @@ class SymmetricElimination:
     def info(self, negative: Collection[Node] = ()) -> Node:
         """0 where all pivots have their sign, else 1 + the place of the first that has not (NaN has not), as a node.
 
-        negative: unknowns whose pivots are to be negative; those of others are to be positive. Once one has failed,
-        those after it mean nothing. Two operations for each pivot. Raises SingularError for a constant of the other
-        sign, and for a pair, unless it is one of each kind: one of its eigenvalues is negative.
+        negative: unknowns whose pivots are to be negative. Raises SingularError for a constant of the other sign, and
+        for a pair, of which one eigenvalue is negative, unless it is one of each kind.
         """
         pairs = {i: pair for pair in self._pairs for i in pair}
         info = as_node(0.0)

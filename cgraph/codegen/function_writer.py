@@ -11,9 +11,8 @@ from .arithmetic import Arithmetic, words_of
 class FunctionWriter:
     """Lines of one function over numbers in memory, with loops and conditions; every value has a new name.
 
-    A number is a double, or a vector of one for each lane.
-    type, bits: of a number and of a condition, in LLVM's language.  lines: what has been written.  scratch:
-    allocations, which stand once at the start.
+    type, bits: of a number (a double, or a vector of lanes) and of a condition, in LLVM's language.
+    lines: what has been written.  scratch: allocations, which stand once at the start.
     """
 
     def __init__(self, arithmetic: Arithmetic) -> None:

@@ -25,9 +25,8 @@ class Joined(NamedTuple):
 class Merged(NamedTuple):
     """Several nodes of a graph that machine code does in one step.
 
-    calls: {node: the call that gives it}.  products: {sum or difference: its argument that it multiplies itself}.
-    of_libm: nodes of a vector that each lane has from libm, though there is a polynomial.
-    sums: {sum of products: those that are added up with it}.
+    calls: {node: the call that gives it}.  products: {sum: its argument that it multiplies itself}.
+    of_libm: nodes of a vector that each lane has from libm.  sums: {sum of products: those added up with it}.
     """
 
     calls: Mapping[Node, Joined]
@@ -40,11 +39,9 @@ Scheduled = Node | Joined | Sums
 
 
 def schedule(graph: Graph, merged: Merged) -> dict[Scheduled, tuple[Scheduled, ...]]:
-    """Every operation once and what it reads, arguments first, and before the results of a joined call the call.
+    """Every operation once and what it reads, arguments first, in the order in which the nodes were made.
 
-    The order is that in which the nodes were made: a derivation goes from body to body, and what it makes for one is
-    used by the next. Calls of library functions come as early as they can, since a call empties the registers and at
-    first there is little in them.
+    Calls of library functions come as early as they can, since a call empties the registers.
     """
     reads: dict[Scheduled, tuple[Scheduled, ...]] = {}
     stack: list[Scheduled] = list(graph.outputs.values())

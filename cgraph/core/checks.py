@@ -11,11 +11,9 @@ MAX_LENGTH = 1000  # characters; a derived name, such as that of a second deriva
 
 
 def check_name(what: str, name: str, *, spaces: bool = True) -> str:
-    r"""The name, if it is one: 1 to 1000 printable characters; spaces: whether it may have any.
+    """The name, if it is 1 to 1000 printable characters; spaces: whether it may have any. Raises TypeError, ValueError.
 
-    Names are labels: generated code numbers its identifiers, so a name may be a keyword, a formula or a word of any
-    language. What would change a text around it is refused: control characters, characters without a glyph (which make
-    two names look alike), and halves of surrogate pairs, which no file can hold. Raises TypeError, ValueError.
+    Refused are control characters, characters without a glyph, and halves of surrogate pairs.
     """
     if not isinstance(name, str):
         raise TypeError(f"the name of {what} must be a string, got {type(name).__name__}: {name!r:.60}")

@@ -92,17 +92,10 @@ def _as_value(name: str, value: object) -> Value:
 
 
 def real_array(what: str, value: object) -> Array:
-    """The value as an array of float64, itself if it is one, but not from what NumPy would silently make numbers of.
+    """The value as an array of float64, itself if it is one.
 
-    Raises TypeError for complex numbers (their imaginary part would be lost), text, dates and masked values, ValueError
-    for rows of different lengths and a number too large for float64.
-
-    >>> from cgraph._shared import real_array
-    >>> real_array("q", [1, 2])
-    array([1., 2.])
-    >>> real_array("q", [1, 2j])
-    Traceback (most recent call last):
-    TypeError: q must be real numbers, got complex numbers
+    Raises TypeError for complex numbers, text, dates and masked values, ValueError for rows of different lengths and a
+    number too large for float64.
     """
     value = floats(value)
     if type(value) is np.ndarray and value.dtype == np.float64:

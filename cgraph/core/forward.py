@@ -55,11 +55,8 @@ def tangents(
 class ReachedNodes:
     """Flags of nodes, each a node that is not 0 exactly where one sweep, forward or reverse, reaches it.
 
-    A selecting operation such as `where` has the partial 0 in an argument that it leaves out. Beyond it, whichever way
-    the sweep goes, the tangent or cotangent is 0 and must stay 0, though partials there may be infinite or NaN: in
-    where(x > 0, log(x), x) at x = 0 the cotangent of log(x) is 0, and what it passes to x is 0 too, not 0 times 1 / x.
-    Any other 0 times infinity is NaN, as in IEEE arithmetic.
-
+    Beyond an argument that `where` leaves out, tangents and cotangents stay 0, though partials there may be infinite:
+    in where(x > 0, log(x), x) at x = 0 what log(x) passes to x is 0, not 0 times 1 / x.
     seeds: {seed: its flag}: its value, where a seed that is 0 is to reach nothing; else None.
     """
 

@@ -92,8 +92,7 @@ class SourceLine(NamedTuple):
 class Label:
     """Meaning of a node: tags of the person who wrote it, roles from differentiation, and source lines.
 
-    A label lives as long as a node has it. Labels of the same sets are one object, so that most comparisons are a
-    comparison of pointers; of labels with many tags there may be two of the same meaning.
+    Labels of the same sets are one object, so that most comparisons are of pointers.
     roles: among "input", "primal", "adjoint", "tangent", see `Node`.
     """
 

@@ -13,14 +13,10 @@ import numpy as np
 class Row:
     """Row of an operation as the core reads it; `cgraph.operations` has the rows, with the columns of other parts.
 
-    name, arity: an identifier, and the number of arguments.
-    scalar, array: value on floats, and on arrays that broadcast.
-    partials: of the output's node and the arguments': the partial derivative in each argument, a node or a number.
-    samples: points inside the domain, away from kinks.
-    commutative: whether f(a, b) is f(b, a).
-    selects: whether an argument that is not used must not reach the result, not even as NaN.
-    fold: of the arguments' nodes, the simpler node that stands for the operation on them, or None.
-    singular: not None where the slope may be unbounded.
+    scalar, array: value on floats, and on arrays that broadcast.  samples: points inside the domain, away from kinks.
+    partials(y, *args): the partial derivative in each argument, a node or a number.
+    commutative: f(a, b) = f(b, a).  selects: whether an argument that is not used must not reach the result.
+    fold(*args): the simpler node of the operation, or None.  singular: not None where a slope is unbounded.
     """
 
     name: str

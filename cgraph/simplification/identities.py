@@ -26,12 +26,6 @@ def shortened(nodes: Sequence[Node], below: int | None = None) -> list[Node]:
 
     Together where that takes fewer nodes; else, of some, those that then depend on fewer variables.
     below: of how many nodes a result has to be less; nodes stay where it is not.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import shortened
-    >>> x, y = cg.variables("x y")
-    >>> shortened([cg.cos(x) * cg.cos(x + y) + cg.sin(x) * cg.sin(x + y), x * (1.0 - cg.cos(y))])
-    [<node cos>, <node mul>]
     """
     old = list(nodes)
     if len(topological(old)) > LARGEST_REWRITTEN:

@@ -21,12 +21,6 @@ def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
 
     As {monomial: coefficient}, a monomial being ((name, power), ...) in order of names; terms that cancel are absent.
     atoms: {inner node: name}, nodes that are written as one symbol. Raises GraphError for any other operation.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import expand
-    >>> a, b = cg.variables("a b")
-    >>> expand((a - b) * (a + b))
-    {(('a', 2),): 1.0, (('b', 2),): -1.0}
     """
     order, atoms = topological([node]), atoms or {}
     symbols = {inner: atoms.get(inner, inner.name) for inner in order if inner in atoms or not inner.args}
@@ -43,14 +37,7 @@ def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
 
 @explain_failure
 def format_polynomial(terms: Polynomial) -> str:
-    """A polynomial, see `expand`, as text, terms in order of degree and name; "0" without terms.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import expand, format_polynomial
-    >>> a, b = cg.variables("a b")
-    >>> format_polynomial(expand((a - b) ** 2))
-    '-2*a*b + a^2 + b^2'
-    """
+    """A polynomial, see `expand`, as text, terms in order of degree and name; "0" without terms."""
     text = ""
     for monomial, coefficient in sorted(terms.items(), key=lambda item: (sum(p for _, p in item[0]), item[0])):
         factors = [name if power == 1 else f"{name}^{power}" for name, power in monomial]

@@ -29,22 +29,11 @@ RATIOS = (1.0, 2.0, 0.5)  # of two sums of which one is written, with the rates 
 
 @explain_failure
 def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None, largest: int = LARGEST) -> list[Node]:
-    r"""Nodes of the same values, as a person writes them.
+    """Nodes of the same values, as a person writes them: `x**2` a power, sums that begin with a positive term.
 
-    The nodes are not folded, and have the names that they had: `x**2` is a power, and a sum is a chain of + and - that
-    begins with a positive term, if there is one. Values differ by rounding. To be typeset by `statements`; a graph that
-    is computed is made by `cg.simplify`.
-
-    ranks: {name of a variable: its rank}, 0 of what is not named. In a product numbers stand first, then parameters
-    (0), coordinates (1), functions (2), and rates (3 and more), by which terms are collected; of one rank in the order
-    of `ranks`.  largest: nodes of one that is written out, and of all four times as many.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import reading_form
-    >>> m, l, w = cg.variables("m l w")
-    >>> (y,) = reading_form([w * (l * (w * m)) * l + (-2.0) * m], {"m": 0, "l": 0, "w": 3})
-    >>> print(cg.latex(y))
-    m \, {l}^{2} \, {w}^{2} - 2 \, m
+    ranks: {variable: rank}, default 0. In a product numbers stand first, then parameters (0), coordinates (1),
+    functions (2) and rates (3 and more), by which terms are collected.
+    largest: nodes of one that is written out, and of all four times as many.
     """
     reader = _Reader(ranks or {}, largest)
     plain = reader.tidied(nodes)

@@ -71,11 +71,10 @@ def output_bounds(
     of_inputs: float,
     stored: Callable[[float], float],
 ) -> tuple[dict[Node, Value], Array]:
-    """Values of nodes, arguments first, and bounds, (outputs, points), of the errors of some of them to first order.
+    """Values of nodes, arguments first, and bounds, (outputs, points), of the errors of outputs to first order.
 
-    The error of an output is the sum of the own errors of all nodes times its derivatives by them, which a sweep back
-    gives: what passes on by several ways cancels with its signs, where `error_bounds` adds up sizes. In an elimination
-    that makes many decades.  Arguments as there, values of (points,).
+    An output's error is the sum of all own errors times its derivatives, by a reverse sweep: ways cancel with their
+    signs, where `error_bounds` adds up sizes. Arguments as there, values of (points,).
     """
     partials, found = _with_partials(nodes, values)
     bars: dict[Node, Array] = {}  # derivatives of the outputs by a node, (outputs, points)
@@ -115,19 +114,11 @@ _POINTS, _SIGNS = 256, 1021  # samples, whose mean is certain to a tenth; operat
 
 
 def rounding_spread(graph: Graph, values: Mapping[str, float], sizes: Mapping[str, float] | None = None) -> float:
-    """Shift of outputs where the results of all operations are off by one part in 2^30, either way at random.
+    """Relative shift of the worst output, in parts of 2^-30, where results are off by 2^-30, either way at random.
 
-    Of the worst output, in parts of the largest and of 2^-30: the mean of the sample points where that is finite,
-    infinite without any. A running bound adds sizes where errors cancel, as they do by the thousand in an elimination.
-    values: {input: number}, such as parameters; the other inputs are normally distributed, the same every time.
-    sizes: what inputs are drawn of, and outputs compared by, where they have units; 1 of those that are not named.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import rounding_spread
-    >>> x, y = cg.variables("x y")
-    >>> product, difference = cg.Graph([x, y], {"f": x * y}), cg.Graph([x, y], {"f": (1e3 + x * y) - 1e3})
-    >>> rounding_spread(product, {}).__round__(), rounding_spread(difference, {}) > 1e3
-    (1, True)
+    The mean of the sample points where that is finite, infinite without any. A bound adds sizes where errors cancel.
+    values: {input: number}; the other inputs are normally distributed, the same every time.
+    sizes: what inputs are drawn of, and outputs compared by; default 1.
     """
     require_graph("rounding_spread", graph)
     require_mapping("values", values, "name: number")

@@ -12,18 +12,9 @@ from pathlib import Path
 
 
 def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> Path:
-    """Write a file whole or not at all, by way of a temporary file beside it; its path. Text is UTF-8.
+    """Write a file whole or not at all, by a temporary file beside it; its path. Text is UTF-8, links are followed.
 
-    A link is followed, and stays a link. Raises OSError with the path in its message, if the folder is missing or must
-    not be written to: what was at the path stays, and nothing else is left behind.
-    mode: permissions, less the process's umask: 0o600 keeps the file from others.
-
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from cgraph._shared import atomic_write
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     atomic_write(Path(folder, "notes.txt"), "done").read_text()
-    'done'
+    mode: permissions, less the process's umask.  Raises OSError with the path in its message; nothing is left behind.
     """
     write_files({Path(path): data}, mode=mode)
     return Path(path)
@@ -61,11 +52,6 @@ def check_writable(path: str | Path) -> None:
     """Find out whether a file could be written, before the work of making what goes there. Leaves nothing behind.
 
     Raises OSError as `atomic_write` would for the place alone.
-
-    >>> from cgraph._shared import check_writable
-    >>> check_writable("nowhere/at/all.svg")
-    Traceback (most recent call last):
-    FileNotFoundError: [Errno 2] cannot write .../nowhere/at/all.svg: the folder .../nowhere/at does not exist
     """
     if _is_device(Path(path)):
         if not os.access(path, os.W_OK):  # opening a pipe would wait for its reader

@@ -48,20 +48,7 @@ _kept: WeakSet[_Results] = WeakSet()
 
 
 def memo(size: int) -> Callable[[Callable[Arguments, Result]], Memo[Arguments, Result]]:
-    """The decorator of a function that keeps its last results, for as long as the process or until `clear_caches`.
-
-    Its arguments must be hashable, and those that are compared by identity are kept alive. docs/design.md lists every
-    function that has it.  size: how many results are kept at most, the last ones used.
-
-    >>> from cgraph._shared import memo
-    >>> @memo(16)
-    ... def square(x):
-    ...     print("made")
-    ...     return x * x
-    >>> square(3.0), square(3.0)
-    made
-    (9.0, 9.0)
-    """
+    """A decorator: the function, of hashable arguments, keeps its last `size` results until `clear_caches`."""
 
     def decorate(function: Callable[Arguments, Result]) -> Memo[Arguments, Result]:
         keeping = cast("Memo[Arguments, Result]", lru_cache(size)(function))
@@ -74,20 +61,9 @@ def memo(size: int) -> Callable[[Callable[Arguments, Result]], Memo[Arguments, R
 def kept_by_first(
     function: Callable[Concatenate[First, Arguments], Result],
 ) -> Callable[Concatenate[First, Arguments], Result]:
-    """The function, whose results its first argument keeps: a `cached_property` that is written elsewhere.
+    """The function, whose results its first argument keeps, as a `cached_property` does.
 
-    They go when that object goes, so the other arguments, hashable, should be few: flags, names, a method. The object
-    is not altered, has a `__dict__` and can be referred to weakly.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import kept_by_first
-    >>> @kept_by_first
-    ... def pullback(graph):
-    ...     return cg.vjp(graph)
-    >>> x = cg.variable("x")
-    >>> graph = cg.Graph([x], {"y": x * x})
-    >>> pullback(graph) is pullback(graph)
-    True
+    The other arguments, hashable, should be few. The first has a `__dict__` and can be referred to weakly.
     """
 
     @wraps(function)

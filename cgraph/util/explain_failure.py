@@ -19,15 +19,7 @@ _STUMBLES = (TypeError, ValueError, AttributeError, KeyError, IndexError, Assert
 def explain_failure(called: T) -> T:
     """The function, or a class with its `__init__`, of which a wrong argument is told in a sentence.
 
-    Nothing is looked at before a call has failed, so a right call takes no longer. Then the arguments are held against
-    their annotations, and the first that does not fit is told. Where all fit, the error goes on as it is.
-
-    >>> @explain_failure
-    ... def total(numbers: list[float]) -> float:
-    ...     return sum(numbers)
-    >>> total([1.0, "a"])
-    Traceback (most recent call last):
-    TypeError: numbers of total must be list[float], got str within: 'a'
+    Arguments are held against their annotations after a call has failed. Where all fit, the error goes on as it is.
     """
     if not isinstance(called, type):
         return _explained(called, called.__name__)  # type: ignore[return-value]  # of the same signature

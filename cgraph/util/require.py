@@ -50,11 +50,6 @@ def require_sequence(what: str, value: object, of: str, kind: type | tuple[type,
     """The members of a sequence, each an instance of `kind`; an iterator is read once. Raises TypeError.
 
     of: what they are, in the plural.
-
-    >>> from cgraph._shared import require_sequence
-    >>> require_sequence("outputs", 3, "names")
-    Traceback (most recent call last):
-    TypeError: outputs must be a sequence of names, got int: 3
     """
     if not isinstance(value, Iterable) or isinstance(value, type):
         raise TypeError(f"{what} must be a sequence of {of}, got {type(value).__name__}: {value!r:.60}")

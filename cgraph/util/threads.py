@@ -13,14 +13,7 @@ from ..core.evaluation import Array
 
 
 def thread_count(threads: int | None) -> int:
-    """The number of threads that an argument `threads` asks for: at least 1; None is one for each core of this process.
-
-    Raises ValueError for anything else.
-
-    >>> from cgraph._shared import thread_count
-    >>> thread_count(3)
-    3
-    """
+    """The number of threads that an argument `threads` asks for: at least 1; None is one for each core."""
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
@@ -32,12 +25,6 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
     """Run `work(item)` for every item, in whichever thread is free; the caller's thread is one of them.
 
     After an exception, Ctrl-C among them, no thread begins another item; it is raised once all have stopped.
-
-    >>> from cgraph._shared import share
-    >>> squares = [0] * 4
-    >>> share(lambda i: squares.__setitem__(i, i * i), range(4), threads=2)
-    >>> squares
-    [0, 1, 4, 9]
     """
     waiting = deque(items)
 

@@ -17,12 +17,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
-    """The known names, at most so many, that are spelled most like a name, whatever their case; the best first.
-
-    >>> from cgraph.util.words import nearest
-    >>> nearest("q.ankel", ["q.hip", "q.knee", "q.ankle"])
-    ['q.ankle']
-    """
+    """The known names, at most so many, that are spelled most like a name, whatever their case; the best first."""
     folded: dict[str, str] = {}
     for each in islice(known, _MOST_NAMES):
         folded.setdefault(each[:_LONGEST_NAME].casefold(), each)
@@ -30,14 +25,7 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
 
 
 def or_nearest(name: str, known: Sequence[str]) -> str:
-    """End of an error that begins with "there is no ...": the nearest of the known names, or some of them.
-
-    >>> from cgraph._shared import or_nearest
-    >>> or_nearest("kne", ["hip", "knee", "ankle"])
-    "did you mean 'knee'?"
-    >>> or_nearest("x", ["hip", "knee", "ankle"])
-    'it has hip, knee, ankle'
-    """
+    """End of an error that begins with "there is no ...": the nearest of the known names, or some of them."""
     if near := nearest(name, known):
         return f"did you mean {' or '.join(map(repr, near))}?"
     return f"it has {listed(known) or 'none'}"

@@ -17,26 +17,9 @@ Held = TypeVar("Held")
 
 
 class HoldsNodes:
-    """An object whose attributes hold nodes, however deep: it pickles with them, and nodes that it shares stay shared.
+    """An object whose attributes hold nodes: it pickles with them, without what was derived, and sharing is kept.
 
-    What was derived and can be again, cached properties and results that `kept_by_first` keeps, stays where it is.
-
-    Raises
-    ------
-    pickle.PicklingError
-        When it is pickled, for a function that another process cannot find: a lambda, or one inside another.
-
-    Examples
-    --------
-    >>> import pickle
-    >>> import cgraph as cg
-    >>> from cgraph._shared import HoldsNodes
-    >>> class Spring(HoldsNodes):
-    ...     def __init__(self, force):
-    ...         self.force = force
-    >>> state = Spring(3.0 * cg.variable("x")).__reduce__()
-    >>> state[1][2]
-    <Graph (x) -> (0): 3 nodes, 2 edges>
+    Raises pickle.PicklingError for a function that another process cannot find, such as a lambda.
     """
 
     def __getstate__(self) -> dict[str, Any]:

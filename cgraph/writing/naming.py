@@ -103,15 +103,7 @@ class Remarks(NamedTuple):
 
 
 def remarked(graph: Graph, remarks: Callable[[Graph], Remarks]) -> Graph:
-    """The graph, which from now on has these remarks, made when a drawing asks for them; what is made of it has not.
-
-    >>> import cgraph as cg
-    >>> from cgraph._shared import Remarks, remarked, remarks_of
-    >>> q0 = cg.variable("q0")
-    >>> graph = remarked(cg.Graph([q0], {"y": cg.sin(q0)}), lambda graph: Remarks({"q0": "q.knee"}))
-    >>> remarks_of(graph).names["q0"], remarks_of(cg.simplify(graph)).words
-    ('q.knee', '')
-    """
+    """The graph, which from now on has these remarks, made when a drawing asks for them; what is made of it has not."""
     graph.__dict__["_remarks"] = remarks
     return graph
 

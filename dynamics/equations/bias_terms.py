@@ -16,9 +16,8 @@ from .velocity_nodes import velocity_nodes
 class BiasTerms(NamedTuple):
     """The terms of  d/dt dL/dqd - dL/dq = (sum over z of inertial_z dz/dqd) - gradient.
 
-    z are the velocity nodes of L (`velocity_nodes`): the bias is a set of forces, each at the velocity it works on, and
-    the sum is their virtual power. Forward dynamics by elimination takes them as they are, without forming the sum.
-    The slopes dz/dqd are the partial velocities of Kane's equations.
+    z are the velocity nodes of L, and dz/dqd the partial velocities of Kane's equations: the bias is a set of forces,
+    which forward dynamics by elimination takes as they are.
     """
 
     lagrangian: Node  # folded and shared

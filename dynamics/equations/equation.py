@@ -94,11 +94,8 @@ class Output:
 class Equation:
     """The row of an equation: what its graph takes and gives.
 
-    As a decorator of a derivation, which gives the nodes of all outputs of a system in one or more forms, it makes the
-    public function of a model: the smallest graph of these forms, its outputs named. `describes` is the decorator of a
-    function that has options of its own, and makes its graph itself. Both write the tables of the docstring, as
-    `documented` does, with inputs and outputs under Returns.
-
+    It decorates a derivation, which yields the nodes of all outputs in one or more forms: the smallest graph counts.
+    `describes` decorates a function that makes its graph itself. Both write the tables of the docstring.
     inputs: kinds of variables, as "q qd tau"; t and parameters follow.  rewritten: whether `shortened` is asked.
     """
 

@@ -30,9 +30,8 @@ from cgraph.extend import Builder, topological
 def velocity_nodes(output: Node, q: Sequence[Node], qd: Sequence[Node], t: Node, build: Builder) -> list[Node]:
     """The velocity nodes z = d/dt f(q) that `output` is made from: those used by anything that is no velocity node.
 
-    Recognized are: qd_i; sums of velocity nodes; a velocity node times a constant; a velocity node d/dt f(y) times
-    g(y), for one node y of positions.
-    build: made the nodes of `output`; a sum is known for the time derivative of a node by the sum of their positions.
+    Recognized are: qd_i; sums of velocity nodes; a velocity node times a constant; d/dt f(y) times g(y), for one node y
+    of positions.  build: made the nodes of `output`.
     """
     recognition = _Recognition(q, qd, t, build)
     used: dict[Node, None] = {}

@@ -129,13 +129,10 @@ class Criterion:
 
 @dataclass(frozen=True)
 class StabilityCase(AccuracyTask):
-    """One row of the stability table; `about` says what is hard here. `exact` may be of a limit of the motion.
+    """One row of the stability table; `about` says what is hard here.
 
-    atol: absolute tolerance, where that of one in a thousand of RTOL in SI units is too much or too little; for all
-    states, or for each.
-    growth: what the flow makes of a small relative error of the start by t_end (the largest of all states, each
-    relative to its size); the tests measure it. None where there is no solution to compare with. Where no criterion is
-    of the error, `error_criterion(growth)` is the last.
+    atol: absolute tolerance, for all states or for each; default a thousandth of RTOL in SI units.
+    growth: the largest relative change by t_end for a small relative change of the start; None without a solution.
     invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion.
     """
 

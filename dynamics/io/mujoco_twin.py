@@ -36,9 +36,8 @@ def _tree(mechanism: Mechanism) -> Mechanism:
 class MujocoTwin:
     """MuJoCo's model of a mechanism, asked for the quantities that the graphs give.
 
-    Damping is in the accelerations and not in `bias`, as in `dynamics`. Of a mechanism with loops it has the tree,
-    whose torques, mass matrix and bias are the mechanism's; its accelerations and motions are not, as MuJoCo's equality
-    constraints are soft, and are refused. Raises ImportError without MuJoCo.
+    Damping is not in `bias`. Of a mechanism with loops it has the tree; accelerations and motions are refused, as
+    MuJoCo's equality constraints are soft. Raises ImportError without MuJoCo.
     """
 
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:

@@ -30,13 +30,9 @@ if TYPE_CHECKING:
 class Series:
     """The series of a state equation, and its coefficients at a point.
 
-    graph: inputs the states, then others; outputs the rates in the order of `states`.
-    constants: {name of an input: number} for all inputs but the states and t.
-    mp: mpmath at the precision at which the series will be used.
-
-    switches: of each piecewise operation, coefficients 0, 1, .. of what chooses its piece by its sign.  sides: that
-    sign.  forced: {piecewise operation: the sign}, imposed in the next expansion where the value at the point does not
-    tell, as just after a switch.
+    graph: inputs the states, then others; outputs the rates.  constants: {input: number}, without states and t.
+    mp: mpmath at the precision of the series.  switches: coefficients of what chooses a piece.
+    sides: its sign.  forced: {piecewise operation: its sign in the next expansion}, just after a switch.
     """
 
     def __init__(self, graph: Graph, states: Sequence[str], constants: Mapping[str, object], mp: MPContext) -> None:

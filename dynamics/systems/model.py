@@ -17,12 +17,9 @@ _OF_VELOCITIES = ("qd{}", "qd{}_old", "qd{}_dot", "qdd{}", "tau{}", "bias{}", "g
 class Model(Protocol):
     """A system, a mechanism or a scene: names, parameters, and the equations behind them.
 
-    `System`, `OdeSystem`, `Mechanism` and `Scene` are models. A class of your own becomes one by these six attributes.
-    One of `system` and `ode` is there, the other is None.
-
+    A class of your own becomes a model by these six attributes. One of `system` and `ode` is None.
     coordinates: names, in the order of q0, q1, ...; of a first-order system its states.
-    velocities: names, in the order of qd0, qd1, ...: those of the coordinates, unless there are quasi-velocities; none
-    of a first-order system.
+    velocities: names, in the order of qd0, qd1, ...; none of a first-order system.
     parameters: {name: value}; each is an input of the graphs, and a run binds it to the value.
     system: the Lagrangian system.  ode: the first-order system.  mechanism: the bodies, None of a model without.
     """

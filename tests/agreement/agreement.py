@@ -1,7 +1,5 @@
 """Agreement: the largest differences of our equations from those of MuJoCo and Pinocchio at random states."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Engines: those that are installed, the numbers at which they are looked at, and the bits of evaluation."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import random
@@ -23,7 +21,6 @@ SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 5e-324, -2.5e-310, 1e300, -1e30
 
 
 def graph_of(op: Op) -> cg.Graph:
-    """The operation on variables."""
     inputs = cg.variables(["a", "b", "c"][: op.arity])
     return cg.Graph(inputs, {"y": apply(op, *inputs)})
 

@@ -1,7 +1,5 @@
 """What importing costs: a package loads NumPy and the standard library, a program what it uses."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -37,7 +35,6 @@ def loaded(program: str, folder: Path) -> dict[str, set[str]]:
 
 
 def roots(modules: set[str]) -> set[str]:
-    """Top-level packages of modules."""
     return {name.partition(".")[0] for name in modules}
 
 

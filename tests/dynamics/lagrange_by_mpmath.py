@@ -1,7 +1,5 @@
 """Lagrange's equation by high-precision differences of L itself: no automatic differentiation, no graph transform."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 

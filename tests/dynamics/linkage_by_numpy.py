@@ -1,7 +1,5 @@
 """Where the parts of a linkage are, how fast, and how far its loops are open: plain NumPy, apart from the library."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +42,6 @@ def placed(mechanism: dyn.Mechanism, q: Array, qd: Array) -> dict[str, Placed]:
 
 
 def energies(mechanism: dyn.Mechanism, q: Array, qd: Array) -> tuple[float, float]:
-    """T and V."""
     kinetic = potential = 0.0
     parts = placed(mechanism, q, qd)
     for body in mechanism.bodies:

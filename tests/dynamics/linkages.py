@@ -1,7 +1,5 @@
 """Linkages for tests: four-bars, a slider-crank and Andrews' squeezer."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

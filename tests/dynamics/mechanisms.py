@@ -1,7 +1,5 @@
 """Mechanisms for tests: random trees and chains, and arms with quarter turns."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

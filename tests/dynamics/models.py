@@ -1,7 +1,5 @@
 """Random models and states for the tests of mechanics, and arrays in and out of graphs by coordinate."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any

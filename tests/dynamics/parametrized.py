@@ -1,7 +1,5 @@
 """Mechanisms whose numbers are replaced by parameters: names, variables, and formulas of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -13,8 +11,6 @@ from dynamics.multibody.bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES
 
 
 class Replaced:
-    """Numbers replaced, and what they were."""
-
     def __init__(self, seed: int, share: float) -> None:
         self.rng, self.share = np.random.default_rng(seed), share
         self.values: dict[str, float] = {}

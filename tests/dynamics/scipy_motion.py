@@ -1,7 +1,5 @@
 """Motions by SciPy's `solve_ivp` on the compiled state equation: a reference that shares no integrator with ours."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike

@@ -1,7 +1,5 @@
 """A state as the arguments q and qd."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from dynamics.systems.model import Model, as_ode

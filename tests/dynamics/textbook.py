@@ -1,7 +1,5 @@
 """Textbook systems written from positions, as somebody would who differentiates them by the chain rule."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import cgraph as cg
@@ -28,10 +26,7 @@ def kinetic(mass: float, position: Sequence[Node], q: Sequence[Node], qd: Sequen
 
 
 def points(
-    masses: Sequence[float],
-    places: Callable[..., list[list[Node]]],
-    n: int,
-    more: Callable[..., Node] | None = None,
+    masses: Sequence[float], places: Callable[..., list[list[Node]]], n: int, more: Callable[..., Node] | None = None
 ) -> dyn.System:
     """Point masses at places(q, t) in gravity along the last axis, with a potential."""
 
@@ -102,10 +97,7 @@ TEXTBOOK: dict[str, Callable[[], dyn.System]] = {
     ),
     "absolute double": lambda: points(
         [1.3, 0.8],
-        lambda q, t: [
-            [L1 * s(q[0]), -L1 * c(q[0])],
-            [L1 * s(q[0]) + L2 * s(q[1]), -L1 * c(q[0]) - L2 * c(q[1])],
-        ],
+        lambda q, t: [[L1 * s(q[0]), -L1 * c(q[0])], [L1 * s(q[0]) + L2 * s(q[1]), -L1 * c(q[0]) - L2 * c(q[1])]],
         2,
     ),
     "relative triple": lambda: points(
@@ -136,9 +128,7 @@ TEXTBOOK: dict[str, Callable[[], dyn.System]] = {
     "cycloid": lambda: points([1.3], lambda q, t: [[R * (q[0] - s(q[0])), R * (c(q[0]) - 1.0)]], 1),
     "cone": lambda: points([1.3], lambda q, t: [[0.6 * q[0] * c(q[1]), 0.6 * q[0] * s(q[1]), 0.8 * q[0]]], 2),
     "torus": lambda: points(
-        [1.3],
-        lambda q, t: [[(2.0 + R * c(q[0])) * c(q[1]), (2.0 + R * c(q[0])) * s(q[1]), R * s(q[0])]],
-        2,
+        [1.3], lambda q, t: [[(2.0 + R * c(q[0])) * c(q[1]), (2.0 + R * c(q[0])) * s(q[1]), R * s(q[0])]], 2
     ),
     "spherical coordinates": lambda: points(
         [1.3],

@@ -1,7 +1,5 @@
 """Random linkages whose loops say more than they need, in any axes and units, with joints that are tilted a little."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -3,8 +3,6 @@
 Their slopes are central differences. Arrays hold decimal numbers, and are rounded at last.
 """
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from decimal import Decimal
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Mechanisms in other units of mass, length and time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import NamedTuple
@@ -15,8 +13,6 @@ LIMITS = {"mass": 12.0, "length": 9.0, "time": 6.0}  # decades of the factors, e
 
 
 class Units(NamedTuple):
-    """Factors on the numbers of masses, lengths and times."""
-
     mass: float = 1.0
     length: float = 1.0
     time: float = 1.0
@@ -26,7 +22,6 @@ class Units(NamedTuple):
         return self.mass * self.length * self.length / self.time / self.time
 
     def of(self, mechanism: dyn.Mechanism) -> Array:
-        """The factors on the coordinates, (n,)."""
         return np.array([1.0 if body.joint.type.turns else self.length for body in mechanism.moving])
 
 
@@ -36,7 +31,6 @@ def random_units(rng: np.random.Generator, *, binary: bool) -> Units:
 
 
 def in_units(mechanism: dyn.Mechanism, units: Units) -> dyn.Mechanism:
-    """The mechanism with its numbers in other units."""
     m, length, t = units
     bodies = []
     for body in mechanism.bodies:

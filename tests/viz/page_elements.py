@@ -1,7 +1,5 @@
 """The elements of a page, for tests of what a browser would read."""
 
-from __future__ import annotations
-
 from html.parser import HTMLParser
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}

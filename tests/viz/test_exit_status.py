@@ -1,7 +1,5 @@
 """Exit statuses: every row of the table in docs/commands.md, run."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """Ctrl-C in a command: its status, no file, no verdict."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

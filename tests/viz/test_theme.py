@@ -9,7 +9,6 @@ from viz import theme
     [
         ("q0", "q₀"),
         ("qd12", "q̇₁₂"),
-        ("qdd1", "q̈₁"),
         ("tau2", "τ₂"),
         ("theta", "θ"),
         ("dL/dqd0", "dL/dq̇₀"),
@@ -19,7 +18,6 @@ from viz import theme
         ("x_dot", "x_dot"),  # a tangent in general
         ("q_dot_max", "q_dot_max"),
         ("dt", "dt"),
-        ("x", "x"),
         ("2q", "2q"),
     ],
 )

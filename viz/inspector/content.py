@@ -28,14 +28,12 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Version:
-    """One of the graphs that the page switches among, and what to see in it.
+    """One of the graphs that the page switches among.
 
-    about: a sentence or two.  marked: nodes in the one color of what is wrong.  steps: to be gone through one by one.
-    rows: {title: nodes} of the rows of the picture from the bottom; a node that is in none
-    stands in the first. Without any, rows are the sweeps.  blamed: edges in that color.  flawed: whether the version is
-    wrong.  off: the outputs in which it is; without any, all that differ.  excess: what its outputs have too much, by
-    their names, a graph of inputs of the state.  group: versions of one share a picture, in which what computes the
-    same has the same place; rows are alike in a group.
+    about: a sentence or two.  marked, blamed: nodes and edges in the color of what is wrong.  off: wrong outputs.
+    steps: to be gone through one by one.  rows: {title: nodes} of the rows from the bottom; default the sweeps.
+    flawed: whether the version is wrong.  excess: a graph of what its outputs have too much.
+    group: versions of one share a picture and its places.
     """
 
     name: str
@@ -106,11 +104,9 @@ class Motion:
     """The instants that the page plays, and points that move, drawn beside the graph as sticks.
 
     t: (T,) [s].  points: (T, k, 2) [m], x to the right, y up, or None.  parents: (k,), the point each hangs on, or -1.
-    places: the points as a graph of inputs of the state, outputs x0, y0, x1, .., shown when a person changes the state.
-    joints: for every velocity the point where its joint is.  turns: whether it turns what is seen, 1 counterclockwise,
-    -1 the other way, or 0: torques are painted at the first two.
-    radii: of spheres [m].  surfaces: (T, m, 2) [m], or None: the center of each sphere and a mark on it, then of each
-    plane a point and those 1 m from it along two of its directions; `places` has these after the points.
+    places: the points as a graph, outputs x0, y0, x1, ..  joints: for every velocity the point of its joint.
+    turns: 1 counterclockwise, -1 clockwise, 0 for no turn.  radii: of spheres [m].
+    surfaces: (T, m, 2) [m]: center and a mark of each sphere, then a point and two directions of each plane.
     """
 
     t: Array

@@ -31,16 +31,12 @@ ENERGY, ENERGIES = "energy", 3  # the group of the meters that the strip shows, 
 class Live:
     """A motion that a page computes as it is watched.
 
-    rate: the state equation, whose first inputs are the state, and output k the rate of input k.
-    start: a value of every input.  dt: the step at first [s].  methods: those of `dynamics.integrators.TABLEAUS`.
-    shown: over the same inputs, an output for each meter, then x and y of each point [m], and of points of surfaces.
-    meters: name, unit and group, the first three kinetic, potential and total energy, or none of group "energy".
-    notes: {group of meters: a sentence on what they are}.  radii: of spheres of contacts, see `inspector.Motion`.
-    parents: of each point the earlier one that it hangs on, or -1.
-    scales: {input: how far its slider reaches to both sides of 0}, by default three times the value, or 1.
-    limits: {input: (lower, upper)}, where its slider ends, at an infinite one as it does without.
+    rate: the state equation, whose first inputs are the state.  start: {input: value}.  dt: the first step [s].
+    methods: as `dynamics.integrators.TABLEAUS`.  shown: outputs for each meter, then x and y of each point [m].
+    meters: (name, unit, group), first kinetic, potential and total energy.  notes: {group of meters: a sentence}.
+    radii: of spheres of contacts.  parents: of each point the one that it hangs on, or -1.
+    scales: {input: reach of its slider}, by default three times the value, or 1.  limits: {input: (lower, upper)}.
     names, units: {input: what a person calls it, and its unit}.
-
     Raises ValueError for an input without a finite value.
     """
 

@@ -60,16 +60,12 @@ DT = 1e-3  # s, the step that the embedded formulations take
 
 @dataclass(frozen=True)
 class Inspection:
-    """versions: {name: the equations}, formulations by their names in `dynamics.FORMULATIONS`.
-    motion: its instants, and joints where the model has places.
+    """versions: {name: the equations}.  motion: its instants, and joints where the model has places.
 
-    at: {input: (T,) or a number}, the one state of all versions.  derived: what follows from it, the inputs of embedded
-    formulations, q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0, and momenta p0 = dL/dqd0; None where nothing
-    does.
-    shares: what each partial Lagrangian takes of the torques, None for one part.  carried: see `carried`.
-    stopped: why the motion ends before its time, empty where it does not.
-    units: {name in the graphs: unit}, where they are known.  causes: what adds up to the torques.
-    lacking: why there are no equations in momenta.
+    at: {input: (T,) or a number}, the one state of all versions.
+    derived: what follows from it: q0_old = q0 - dt q_dot0, qd0_old = qd0 - dt qdd0, p0 = dL/dqd0; or None.
+    shares: what each partial Lagrangian takes of the torques.  stopped: why the motion ends before its time, or "".
+    units: {name in the graphs: unit}.  causes: what adds up to the torques.  lacking: why there are no momenta.
     """
 
     versions: Mapping[str, Version]

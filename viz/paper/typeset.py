@@ -14,11 +14,7 @@ _OPERATOR = re.compile(r"[=+−·×→,()½]")
 
 
 def typeset(text: str) -> str:
-    """The text as an element of MathML.
-
-    >>> typeset("I ω^2")
-    '<math><mrow><mi>I</mi><mspace width="0.15em"/><msup><mi>ω</mi><mn>2</mn></msup></mrow></math>'
-    """
+    """The text as an element of MathML."""
     return f"<math>{row(text)}</math>"
 
 

@@ -38,18 +38,11 @@ class ConstraintWarning(UserWarning):
 
 @kept_by_first
 def independent_rows(constraints: Constraints) -> tuple[int, ...]:
-    """Indices of rows that do not follow from one another, at all states seen.
+    """Indices of rows that do not follow from one another, at random states that meet the constraints.
 
-    Of rows that could stand for one another those are kept of which most is new at the worst of these states, the first
-    ones where there is no great difference: a four-bar in an oblique plane has its closure in three rows, of which two
-    may say nearly the same.
-
-    The states are random ones that meet the constraints, since rows may depend on one another only there. Where the
-    rank is less than elsewhere, a state that is known to the rounding e of the rows is off by sqrt(e), and so are rows
-    that follow from others: states at which as little of a row is new count only if no others are seen. What is new is
-    measured by the size of the row, or of the largest of its loop, about the state. Warns of that, and of rows that are
-    left out, unless they hold nothing, as the third of a point in a plane.
-
+    Of rows that could stand for one another those are kept of which most is new at the worst state, the first ones
+    where there is no great difference. Near a state of less rank, known to a rounding e, rows are off by sqrt(e): such
+    states count only if no others are seen. Warns of that, and of rows that are left out.
     Raises ConstraintError where no state is seen that meets all.
     """
     if not len(constraints):
@@ -94,9 +87,8 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
 def _independent(matrices: Sequence[Array], better: float = np.inf) -> dict[int, float]:
     """Rows that are not sums of others, and how much of each is new where that is least: Gram and Schmidt.
 
-    matrices: J of some states, (m, n), with factors by what J is about the state; by what it is there a row that is
-    small at a flat position would look as good as any.  better: times as much has to be new of a row to take the place
-    of one before it; without, the rows that are not sums of earlier ones.
+    matrices: J of some states, (m, n), with factors by what J is about the state.
+    better: times as much has to be new of a row to take the place of one before it; None for the first rows.
     """
     kept: dict[int, float] = {}
     rest = np.array(matrices)  # (states, m, n)

@@ -111,9 +111,8 @@ def _regimes(system: System, accelerations: Graph) -> list[dict[str, float]]:
 def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
     """Sizes of states, torques and accelerations of bodies, which change with the units of mass, length and time.
 
-    Coordinates have their `coordinate_sizes`, places the length L that an angle of 1 moves the bodies by. With A, the
-    acceleration of bodies at rest, speeds are of size sqrt(A L), and torques are such that they accelerate by A, too.
-    Of a Lagrangian alone units are unknown: all is of size 1.
+    With A, the acceleration at rest, and the length L that an angle of 1 moves bodies by, speeds are sqrt(A L), and
+    torques accelerate by A. Of a Lagrangian alone units are unknown: all is of size 1.
     """
     if system.body_terms is None:
         return {}

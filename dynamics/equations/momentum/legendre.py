@@ -28,12 +28,9 @@ SETTLED = 1e-16  # step M step over u (p - b) where the step is 1e-8 of the velo
 class Legendre:
     """The velocities u of momenta p = dL/du at (q, p), solved for by elimination on the graph of L.
 
-    Where L is quadratic in u, p = M u + b, they are M^-1 (p - b). Else they are iterated, from u = 0: they are where
-    L(q, u) - p u is least, of an L that is strictly convex in u, and Newton's steps go downhill. A share of the step is
-    taken, 1 at first. Where the slope along it has turned to the other sign and is more than half as steep, or L or its
-    slopes are not finite, as past the speed of light, the step is not taken, and a sixteenth tried; else twice the
-    share is next, up to 1. The share has no units, nor is there a threshold that has.
-
+    Where L is quadratic in u, p = M u + b, they are M^-1 (p - b). Else Newton's method goes downhill in L(q, u) - p u
+    from u = 0. Where the slope along a step has turned and is more than half as steep, or is not finite, a sixteenth of
+    the step is tried; else twice the share is next, up to 1. No threshold has a unit.
     p: variables p0, p1, ...  lagrangian: L, folded.  quadratic: whether the solution does not depend on u.
     """
 

@@ -41,9 +41,7 @@ class Drift(NamedTuple):
 def drift(energy: Array, size: float) -> Drift:
     """Band, drift and its standard error of energies, (T,), at equal intervals; from the means of 16 blocks.
 
-    The energy of a symplectic method oscillates with the motion. Means with the weights of a Hann window leave less of
-    an oscillation, by the cube of the number of its periods in a block, than plain ones; the rest is in the residuals
-    of the line, and so in the standard error.
+    Means with the weights of a Hann window leave less of the oscillation of a symplectic method than plain ones.
     """
     deviation = (energy - energy[0]) / size
     length = len(deviation) // BLOCKS

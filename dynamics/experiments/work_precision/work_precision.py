@@ -226,12 +226,9 @@ def work_precision(
 ) -> WorkPrecision:
     """The report of a task.
 
-    name, options: as of `named_tasks.load`.  methods: of `METHODS`.  digits: of the exact motion (default: the task's).
-    turns: all methods run in turns, this often.  limit: seconds of a run after which no finer knob is tried.
-    folder: where exact motions are kept.  say: takes progress lines.
-
-    Raises ValueError for a name that is not known, ImportError without what makes the exact motion, and what
-    `reference` raises.
+    name, options: as of `named_tasks.load`.  methods: of `METHODS`.  digits: of the exact motion.  turns: of all.
+    limit: seconds of a run after which no finer knob is tried.  folder: of exact motions.  say: takes progress lines.
+    Raises ValueError for an unknown name, ImportError without what makes the exact motion, and what `reference` raises.
     """
     check_names(("method", methods, METHODS))
     if turns < 1 or not limit > 0.0:

@@ -304,8 +304,7 @@ def generalized_forces(
 ) -> list[Node]:
     """Q = J^T f + J_w^T torque of all forces on bodies together, and those of joints: one node for each velocity.
 
-    Virtual power is a sum of forces times velocities, linear in qd, so one reverse sweep from the velocities, seeded
-    with the forces, gives its slope along qd. What a force itself depends on is not differentiated.
+    Virtual power is linear in qd: one reverse sweep, seeded with the forces, gives its slope along qd.
     chain: the joints between a body and the world.  moving: bodies.  state: q and qd.
     """
     build, (q, qd) = Builder(), state

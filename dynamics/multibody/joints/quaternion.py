@@ -40,9 +40,8 @@ def rate(e: Sequence[Node], omega: Sequence[Node]) -> list[Node]:
 def rotation_vector(e: Sequence[Node]) -> list[Node]:
     """The rotation as an axis times an angle of at most pi [rad]; smooth but at half turns, where it changes sign.
 
-    With t = tan(angle / 4) = |v| / (|e| + |w|) the angle is 4 atan t, and tan of a half of an angle is t / (1 + sqrt(1
-    + t^2)): after three halvings the angle is at most pi / 32, and atan(t) / t the first terms of its series in t^2, so
-    that nothing is divided by |v|.
+    With t = tan(angle / 4) = |v| / (|e| + |w|) the angle is 4 atan t. tan(a / 2) = t / (1 + sqrt(1 + t^2)) three times
+    leaves at most pi / 32, and atan(t) / t a short series in t^2, so that nothing is divided by |v|.
     """
     w, *v = e
     squares = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]

@@ -1,7 +1,5 @@
 """Elimination in pieces: it solves the same equations as the matrix does, is shallow, and loses no digits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-import cgraph as cg
 from cgraph.autodiff import coloring
 from cgraph.autodiff.coloring import NONE, jacobian_coloring, star_coloring
 from cgraph.autodiff.sparsity import Pattern, symmetric
-from cgraph.writing.naming import free_suffix
 
 LANES = 8
 
@@ -121,21 +119,3 @@ def test_a_full_matrix_is_not_searched(monkeypatch):
     entries = pattern(np.ones((4, 4), dtype=bool))
     assert star_coloring(entries) == [0, 1, 2, 3]
     assert symmetric(entries) is entries
-
-
-def test_names_are_looked_up_and_not_compared():
-    class Name(str):
-        compared = 0
-        __hash__ = str.__hash__
-
-        def __eq__(self, other):
-            Name.compared += 1
-            return str.__eq__(self, other)
-
-    names = [Name(f"x{k}") for k in range(100)]
-    assert free_suffix("_dot", tuple(names), [str(name) for name in names]) == "_dot"
-    assert Name.compared < len(names)
-    inputs = cg.variables([str(name) for name in names])
-    graph, Name.compared = cg.Graph(inputs, {"y": inputs[0]}), 0
-    assert graph.evaluate(dict.fromkeys(names, 1.0)) == {"y": 1.0}
-    assert Name.compared < 5 * len(names)

@@ -15,7 +15,6 @@ def values(graph, numbers):
 
 
 def assembled(parts, point):
-    """The Jacobian, row by row, as a program would run it."""
     known = values(parts.primal, point)
     sums = np.array([values(parts.product, [*known, float(color)]) for color in range(parts.colors)])
     return np.array(values(parts.entries, sums.T.ravel().tolist()))

@@ -26,8 +26,6 @@ x, y = cg.variables("x y")
 
 
 class At(NamedTuple):
-    """A graph at a point."""
-
     graph: cg.Graph
     point: dict[str, float]
 
@@ -79,7 +77,6 @@ def partials_value(partial: cg.Node | float) -> float | None:
 
 
 def every_jacobian(graph: cg.Graph, point: dict[str, float]) -> dict[str, np.ndarray]:
-    """The Jacobian (m, n) by every function that gives it."""
     m, n = len(graph.outputs), len(graph.inputs)
     rows, columns = np.eye(m), np.eye(n)
 

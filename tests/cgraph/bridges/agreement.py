@@ -1,7 +1,5 @@
 """What a function of another library has in common with the graph that it was made of."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import contextmanager
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """`to_casadi`: values and derivatives of every operation, of random graphs and of an arm, in CasADi."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """`to_jax` and `as_jax`: values and derivatives in JAX, jitted and in batches."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -24,7 +22,6 @@ SAMPLES = np.random.default_rng(0).normal(size=(4, 5, 3))
 
 @pytest.fixture(autouse=True)
 def in_float64():
-    """JAX in double precision, for as long as a test takes."""
     before = jax.config.jax_enable_x64
     jax.config.update("jax_enable_x64", True)
     yield

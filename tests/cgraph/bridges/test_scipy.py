@@ -1,7 +1,5 @@
 """`fn.address` and `to_scipy`: machine code called by address, by ctypes and by SciPy's integrals."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import math

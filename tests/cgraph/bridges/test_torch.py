@@ -1,7 +1,5 @@
 """`to_torch`: a compiled graph within PyTorch, with its derivatives, at one point and at many."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -33,7 +33,6 @@ STRICT = ["-std=c99", *WARNINGS]
 
 
 def build(folder, sources, flags=("-O2",)):
-    """One shared library of several sources, loaded."""
     files = [str(source.write(folder)[0]) for source in sources]
     library = folder / f"{sources[0].name}.so"
     run([CC, *STRICT, *flags, "-shared", "-fPIC", *files, "-o", str(library), "-lm"])
@@ -47,7 +46,6 @@ def run(command):
 
 
 def called(library, name, graph, points):
-    """Rows of outputs at rows of inputs."""
     function = library[name]
     function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], None
     found = np.full((len(points), len(graph.outputs)), 123.0)
@@ -212,33 +210,21 @@ def pendulum():
 
 USE = """
 #include "pendulum.h"
+#include "pendulum.h"
 #include <stdio.h>
 
 int main(void)
 {
     double x[PENDULUM_N_IN] = {0}, qdd[PENDULUM_N_OUT];
-    const double dt = 1e-3;
-    int step;
 
     x[PENDULUM_IN_q0] = 1.0;
-    for (step = 0; step < 5000; step++) {
-        x[PENDULUM_IN_tau0] = -0.5 * x[PENDULUM_IN_qd0];
-        pendulum(x, qdd);
-        x[PENDULUM_IN_qd0] += dt * qdd[PENDULUM_OUT_qdd0];
-        x[PENDULUM_IN_q0] += dt * x[PENDULUM_IN_qd0];
-    }
-    printf("%.17g %.17g\\n", x[PENDULUM_IN_q0], x[PENDULUM_IN_qd0]);
+    x[PENDULUM_IN_qd0] = -0.3;
+    x[PENDULUM_IN_tau0] = 0.7;
+    pendulum(x, qdd);
+    printf("%.17g\\n", qdd[PENDULUM_OUT_qdd0]);
     return 0;
 }
 """
-
-
-def stepped():
-    q, qd, dt, graph = 1.0, 0.0, 1e-3, pendulum()
-    for _ in range(5000):
-        qd += dt * graph.evaluate({"q0": q, "qd0": qd, "tau0": -0.5 * qd})["qdd0"]
-        q += dt * qd
-    return q, qd
 
 
 @needs_cc
@@ -247,11 +233,10 @@ def stepped():
 def test_the_header_is_one_of_cpp_too(standard, tmp_path):
     source, _ = cg.to_c(pendulum(), "pendulum").write(tmp_path)
     atomic_write(tmp_path / "main.cpp", USE)
-    (tmp_path / "twice.cpp").write_text('#include "pendulum.h"\n#include "pendulum.h"\n', encoding="utf-8")
     run([CC, *STRICT, "-O2", "-c", str(source), "-o", str(tmp_path / "pendulum.o")])
-    files = [str(tmp_path / name) for name in ("main.cpp", "twice.cpp", "pendulum.o")]
+    files = [str(tmp_path / name) for name in ("main.cpp", "pendulum.o")]
     run([CXX, f"-std={standard}", *WARNINGS, "-ffp-contract=off", *files, "-o", str(tmp_path / "main")])
-    assert tuple(map(float, run([str(tmp_path / "main")]).split())) == stepped()
+    assert float(run([str(tmp_path / "main")])) == pendulum().evaluate({"q0": 1.0, "qd0": -0.3, "tau0": 0.7})["qdd0"]
 
 
 TAKEN = """double main sin sinf erfc isnan islessgreater y0 math restrict printf NULL size_t read getc_unlocked stdin

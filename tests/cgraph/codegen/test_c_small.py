@@ -28,7 +28,6 @@ SMALL = {"rk4": TABLEAUS["rk4"]}
 
 
 def called(library, name, points, count):
-    """Rows of outputs at rows of inputs, in float."""
     function = library[name]
     function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], None
     given, found = np.array(points, dtype=np.float32), np.full((len(points), count), 123.0, dtype=np.float32)
@@ -38,7 +37,6 @@ def called(library, name, points, count):
 
 
 def stepped(library, name, inputs, h, n):
-    """The inputs after n steps."""
     state = np.array(inputs)
     function = library[name]
     function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_double, ctypes.c_ulong], None

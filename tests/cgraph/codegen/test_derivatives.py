@@ -31,7 +31,6 @@ def compiled(graph, backend="auto", cost=None, **options):
 
 
 def values(graph, *parts):
-    """The outputs of a graph at a point, its inputs in order."""
     return np.array(list(graph.evaluate(dict(zip(graph.input_names, np.concatenate(parts), strict=True))).values()))
 
 

@@ -90,9 +90,6 @@ def test_a_deep_graph_needs_no_recursion_and_any_name_is_a_text():
     assert found == [[["x"], [name]], list(graph.evaluate({"x": 0.3}).values())]
 
 
-# Steps.
-
-
 def linear(x, y, t):
     """A state equation of products and sums alone."""
     return [y, -x * 1.7 - 0.3 * y * x * x + 0.25 * t]
@@ -124,9 +121,6 @@ def test_the_order_of_a_method_is_its_own():
     for method, ends in zip(TABLEAUS.values(), run_js(cg.to_js(STATE, TABLEAUS), program), strict=True):
         coarse, fine = (abs(end - math.cos(1.0)) for end in ends)
         assert math.log2(coarse / fine) == pytest.approx(method.order, abs=0.35)
-
-
-# Operations of one's own, and mistakes.
 
 
 def own(javascript, name="versin"):

@@ -193,14 +193,6 @@ def test_fast_arithmetic_keeps_infinities_and_nan():
         assert np.array_equal(function.batch(np.array([point] * 9).T)[:, 8], expected, equal_nan=True)
 
 
-def test_a_pickle_is_rebuilt_with_its_options():
-    for options in ({}, {"fma": False}, {"fast": True}):
-        function = cg.compile(chain(), "llvm", **options)
-        restored = pickle.loads(pickle.dumps(function))
-        assert (restored.source, restored.backend) == (function.source, "llvm")
-        assert same(restored([0.1, 0.2, 0.3]), function([0.1, 0.2, 0.3]))
-
-
 def test_a_pickle_of_another_version_is_refused_in_a_sentence(backend, monkeypatch):
     function = cg.compile(chain(), backend)
     with monkeypatch.context() as patch:
@@ -231,8 +223,3 @@ def test_without_llvmlite_auto_is_generated_python(without):
     assert function.batch(np.ones((3, 4))).shape == (5, 4)
     with pytest.raises(ImportError, match=r"pip install -e '\.\[native\]'"):
         cg.compile(chain(), "llvm")
-
-
-def test_an_unknown_backend_is_an_error():
-    with pytest.raises(ValueError, match="auto, python, numpy, llvm"):
-        cg.compile(chain(), "fortran")

@@ -153,9 +153,6 @@ def test_all_operations_at_any_width_are_those_of_evaluate(lanes):
     assert same(found.T, evaluated(graph, points.T))
 
 
-# Batches and points, as `compile` makes them.
-
-
 @each_row(("name", "options"), itertools.product(FUNCTIONS, OPTIONS))
 def test_a_polynomial_keeps_its_promise_in_a_batch(name, options):
     found = cg.compile(one(name), "llvm", **options).batch(POINTS[name][None])[0]
@@ -204,9 +201,6 @@ def test_fast_arithmetic_leaves_the_reduction_of_an_argument_alone():
     assert "reassoc" in source
     for constant in ("3FF921FB54400000", "3FE62E42FEE00000"):  # of pi / 2, of ln 2
         assert [line.split()[3] for line in source.splitlines() if constant in line] == ["contract"]
-
-
-# The schedule.
 
 
 def test_calls_are_joined_that_do_not_need_each_other():

@@ -32,7 +32,6 @@ def condition(op, point):
 
 @cache
 def derived(op):
-    """The operation, its gradient and its Hessian, of a, b, .."""
     inputs = cg.variables(["a", "b", "c"][: op.arity])
     graph = cg.Graph(inputs, {"y": apply(op, *inputs)})
     return graph, (cg.gradient(graph), cg.hessian(graph))

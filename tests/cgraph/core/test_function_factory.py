@@ -44,8 +44,6 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
         ({"name": "lambda"}, "must be an identifier of Python, got 'lambda'"),
         ({"name": "sine", "partials": None}, "operation 'sine': partials must be a function, got None"),
         ({"name": "compile"}, "cannot be called 'compile', which means something else in cgraph"),
-        ({"name": "util"}, "cannot be called 'util'"),
-        ({"name": "np"}, "cannot be called 'np'"),
         ({"name": "sine", "partials": lambda y, x: ()}, "'sine' takes 1 argument.s., its partials are 0"),
         ({"name": "sine", "partials": lambda y, x: (x, x)}, "'sine' takes 1 argument.s., its partials are 2"),
         ({"name": "sine", "partials": lambda y, x: x}, "'sine': partials must give a tuple, got <node variable"),
@@ -76,7 +74,6 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
             {"name": "sine", "interval": lambda x: (1.0, -1.0)},
             "interval must give low <= high, got .1, -1. for x in .0.3, 0",
         ),
-        ({"name": "sine", "interval": lambda x: (math.nan, 1.0)}, "interval must give low <= high"),
         ({"name": "sine", "interval": lambda x: 1.0}, "interval must give two numbers for x in .0.3, 0.3."),
         (  # right at every point, and not between two
             {"name": "sine", "interval": lambda x: (math.sin(x[0]), math.sin(x[0]))},

@@ -1,7 +1,5 @@
 """`interp`: tables as functions, beside NumPy's and SciPy's, and alike on every back end."""
 
-from __future__ import annotations
-
 import math
 import re
 
@@ -34,7 +32,6 @@ def table(seed, *, least=2):
 
 
 def with_slopes(node):
-    """The value, and its first and second derivative."""
     graph = cg.Graph([X], {"y": node})
     slope = cg.gradient(graph)
     (y,), (d,), (c,) = [each.outputs.values() for each in (graph, slope, cg.gradient(slope))]
@@ -42,7 +39,6 @@ def with_slopes(node):
 
 
 def reference(xs, ys, kind):
-    """SciPy's functions: value, first and second derivative."""
     scipy = pytest.importorskip("scipy.interpolate")
     if kind == "linear" or len(xs) == 2:
         exact = scipy.PPoly(np.array([np.diff(ys) / np.diff(xs), ys[:-1]]), xs)

@@ -1,7 +1,5 @@
 """LaTeX of nodes and graphs: it parses, means what the graph means, and says what it leaves out."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -55,25 +55,8 @@ def test_names_that_python_takes_for_one_stay_two():
         assert cg.compile(cg.Graph([x, y], {"d": x - 2.0 * y}), "python")([1.0, 10.0]).tolist() == [-19.0]
 
 
-def as_event(name):
-    return dyn.Event(name, lambda q, qd, t: q[0])
-
-
-def as_body(name):
-    return dyn.Mechanism([dyn.Body(name, dyn.Joint("revolute"), mass=1.0, center=(1.0, 0.0, 0.0))])
-
-
-def as_joint(name):
-    joint = dyn.Joint("revolute", name=name)
-    return dyn.Mechanism([dyn.Body("a", joint, mass=1.0, center=(1.0, 0.0, 0.0))])
-
-
-def as_coordinate(name):
-    return dyn.System(lambda q, qd, t: qd[0] ** 2, [name])
-
-
-def as_parameter(name):
-    return dyn.System(lambda q, qd, t: qd[0] ** 2, ["x"], {name: 1.0})
+def as_body(name, joint=""):
+    return dyn.Mechanism([dyn.Body(name, dyn.Joint("revolute", name=joint), mass=1.0, center=(1.0, 0.0, 0.0))])
 
 
 def as_tag(name):
@@ -88,12 +71,12 @@ NAMED = {
     "leaf": lambda name: cg.with_name(cg.variable("x"), name),
     "output": lambda name: cg.Graph([], {name: 1.0}),
     "tag": as_tag,
-    "coordinate": as_coordinate,
+    "coordinate": lambda name: dyn.System(lambda q, qd, t: qd[0] ** 2, [name]),
     "state": lambda name: dyn.OdeSystem(lambda x, t: [x[0]], [name]),
-    "parameter": as_parameter,
+    "parameter": lambda name: dyn.System(lambda q, qd, t: qd[0] ** 2, ["x"], {name: 1.0}),
     "body": as_body,
-    "joint": as_joint,
-    "event": as_event,
+    "joint": lambda name: as_body("a", name),
+    "event": lambda name: dyn.Event(name, lambda q, qd, t: q[0]),
 }
 BREAKING = [f"a{sign}b" for sign in "\n\r\u2028\u202e\u200b\x85"]
 REFUSED = [*BREAKING, "a\x00", "\x1b[31m", "\ud800", "x" * 10**6, 1, None]

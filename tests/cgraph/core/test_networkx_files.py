@@ -1,7 +1,5 @@
 """Graphs in the files of networkx: GraphML, GEXF and JSON give back the same graph."""
 
-from __future__ import annotations
-
 import io
 import json
 import math
@@ -28,7 +26,6 @@ def through_files(graph: cg.Graph) -> Iterator[tuple[str, nx.DiGraph]]:
 
 
 def labels(graph: cg.Graph) -> list[tuple[Any, ...]]:
-    """What every node is called."""
     return [(node.name, node.tags, node.roles, node.lines) for node in graph.nodes]
 
 

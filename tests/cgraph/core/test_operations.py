@@ -10,9 +10,9 @@ import pytest
 from mpmath import mpf
 
 import cgraph as cg
-from cgraph.core.node import apply
 from cgraph.operations.operation import OPS, Op
 from tests import high_precision
+from tests.cgraph.engines import graph_of
 
 RELATIVE_ERROR = 1e-13  # of a derivative, relative to the larger of 1 and the size; a few dozen roundings
 ULPS = 4  # NumPy's own vector functions promise no more
@@ -27,13 +27,7 @@ def points(op: Op) -> list[tuple[float, ...]]:
     return [*op.samples, *drawn]
 
 
-def graph_of(op: Op) -> cg.Graph:
-    inputs = cg.variables(NAMES[: op.arity])
-    return cg.Graph(inputs, {"y": apply(op, *inputs)})
-
-
 def at(graph: cg.Graph, *values: float) -> list[float]:
-    """The outputs with inputs given by position."""
     return list(graph.evaluate(dict(zip(graph.input_names, values, strict=True))).values())
 
 
@@ -125,15 +119,6 @@ def value_is_that_of_mpmath(op: Op) -> None:
 def derivatives_are_those_of_mpmath_in_every_mode(op: Op) -> None:
     for point in points(op):
         assert wrong_derivatives(op, point) == []
-
-
-def vjp_is_linear_in_its_cotangent_and_jvp_in_its_tangents(op: Op) -> None:
-    graph, point = graph_of(op), op.samples[0]
-    one, many = at(cg.vjp(graph), *point, 1.0), at(cg.vjp(graph), *point, -2.5)
-    assert all(map(close, many, [-2.5 * bar for bar in one]))
-    weights = [1.5, -0.25, 3.0][: op.arity]
-    (together,) = at(cg.jvp(graph), *point, *weights)
-    assert close(together, sum(w * at(cg.jvp(graph), *point, *unit(op.arity, i))[0] for i, w in enumerate(weights)))
 
 
 def arrays_have_the_values_of_floats(op: Op) -> None:
@@ -228,7 +213,6 @@ PROPERTIES = (
     there_is_one_partial_for_each_argument,
     value_is_that_of_mpmath,
     derivatives_are_those_of_mpmath_in_every_mode,
-    vjp_is_linear_in_its_cotangent_and_jvp_in_its_tangents,
     arrays_have_the_values_of_floats,
     specials_are_those_of_numpy,
     specials_in_arrays_are_those_of_floats,

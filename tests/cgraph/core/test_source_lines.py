@@ -13,7 +13,6 @@ x, y = cg.variables("x y")
 
 
 def here() -> int:
-    """The line of the call."""
     frame = inspect.currentframe()
     assert frame is not None
     assert frame.f_back is not None

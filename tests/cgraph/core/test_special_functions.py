@@ -93,11 +93,3 @@ def test_folding_of_signs_and_of_whole_numbers():
 )
 def test_bounds(node, box, expected):
     assert intervals(cg.Graph([x], {"f": node}), {"x": box})[node] == expected
-
-
-def test_a_reference_solution_refuses_what_jumps():
-    import dynamics as dyn
-
-    system = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - cg.floor(q[0]) * q[0], ["x"])
-    with pytest.raises(NotImplementedError, match="floor has no Taylor series"):
-        dyn.reference(system, [0.5], [0.0], [0.0, 1.0])

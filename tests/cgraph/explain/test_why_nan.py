@@ -105,10 +105,7 @@ def softened(rate):
     )
 
 
-@each_row(
-    "parameters, operation",
-    [({"depth": -1.0}, "sqrt"), ({"gap": 0.5}, "div"), ({}, None)],
-)
+@each_row("parameters, operation", [({"depth": -1.0}, "sqrt"), ({"gap": 0.5}, "div"), ({}, None)])
 def test_a_parameter_out_of_range_is_told_of_a_run(parameters, operation):
     with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
         run = dyn.simulate(softened(1.0), [0.5], [0.0], 0.01, parameters=parameters)

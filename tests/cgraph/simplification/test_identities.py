@@ -1,7 +1,5 @@
 """Identities: what is constant, zero or shorter by them is so in the graph, with the tags of what it came from."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

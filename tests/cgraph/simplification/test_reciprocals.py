@@ -1,7 +1,5 @@
 """Reciprocals: the same function with one division for a divisor."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 from hypothesis import given, settings

@@ -140,11 +140,6 @@ def test_a_constant_expression_without_a_number_stays(node):
     assert math.isnan(result.evaluate({})["f"])
 
 
-def test_what_is_written_is_kept_as_written():
-    graph = cg.Graph([x], {"f": (x + 0) * 1 - x * 0})
-    assert [node.op.name for node in graph.nodes if node.args] == ["add", "mul", "mul", "sub"]
-
-
 def test_specialize_takes_several_inputs_numbers_of_any_kind_and_chosen_outputs():
     graph = cg.Graph([x, y, z], {"f": x * y + z, "g": cg.sin(z)})
     special = cg.specialize(graph, {"x": 2, "y": cg.constant(3.0)}, outputs=["f"])

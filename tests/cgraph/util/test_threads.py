@@ -80,8 +80,7 @@ def test_the_layout_of_the_points_is_no_matter(function):
 def test_one_row_for_all_columns_and_one_column_for_all(function):
     X = points(100)
     assert np.array_equal(
-        function.batch(np.broadcast_to(X[:, :1], (2, 100)), threads=3),
-        function.batch(np.repeat(X[:, :1], 100, axis=1)),
+        function.batch(np.broadcast_to(X[:, :1], (2, 100)), threads=3), function.batch(np.repeat(X[:, :1], 100, axis=1))
     )
     assert np.array_equal(
         function.batch(np.broadcast_to(X[0], (2, 100)), threads=3), function.batch(np.stack([X[0], X[0]]))

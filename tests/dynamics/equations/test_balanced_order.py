@@ -1,7 +1,5 @@
 """The balanced order of elimination on bodies: how deep, how many nodes, how exact; equal to the recursive one."""
 
-from __future__ import annotations
-
 from typing import Any
 from unittest.mock import patch
 

@@ -1,7 +1,5 @@
 """Conserved momenta: those that are, and no others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The rank of rows that a user writes himself, which have no common scale, in any units."""
 
-from __future__ import annotations
-
 import warnings
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Constraints of any Lagrangian: what they hold, what they say nothing about, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

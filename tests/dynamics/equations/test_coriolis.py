@@ -1,7 +1,5 @@
 """The Coriolis matrix: closed form, Christoffel's symbols from differences of M, and what holds of every one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pytest import approx

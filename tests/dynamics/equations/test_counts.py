@@ -16,8 +16,6 @@ def test_inverse_dynamics_of_the_paper_s_arm_is_small() -> None:
     arm = dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])
     counts = dyn.inverse_dynamics(arm, "chain_rule").counts()
     assert (counts.nodes, counts.edges) == (164, 284)
-    assert counts.nodes <= 190
-    assert counts.edges <= 335
 
 
 def test_edges_of_equal_rods_follow_the_laws_of_the_page() -> None:
@@ -46,15 +44,6 @@ def test_each_further_equal_link_adds_79_nodes_and_148_edges_and_91_nodes_to_for
     assert counts.nodes == 8 + 79 * (n - 1)
     assert n < 2 or counts.edges == 146 + 148 * (n - 2)
     assert n < 3 or len(dyn.forward_dynamics(equal_links(n), "recursive").nodes) == 156 + 91 * (n - 3)
-
-
-@mark.parametrize("formulation", ["by_definition", "kinetic_only"])
-@mark.parametrize("n", [1, 3, 10])
-def test_the_chain_rule_is_smaller_than_the_embedded_formulations(n: int, formulation: str) -> None:
-    ours, theirs = (dyn.inverse_dynamics(equal_links(n), each).counts() for each in ("chain_rule", formulation))
-    assert ours.nodes < theirs.nodes
-    assert ours.edges < theirs.edges
-    assert ours.depth < theirs.depth
 
 
 def test_a_parameter_with_a_half_before_it_leaves_no_halves_behind() -> None:

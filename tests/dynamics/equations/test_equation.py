@@ -76,7 +76,6 @@ def test_the_powers_of_length_in_the_units_are_those_of_the_numbers(name: str) -
 
 
 def power(unit: str) -> int:
-    """The power of length in a unit."""
     above, _, below = unit.partition("/")
     parts = above.split(), below.strip("()").replace("s^2", "s").split()
     count = [sum([{"m": 1, "m^2": 2, "N": 1, "J": 2}.get(part, 0) for part in side]) for side in parts]
@@ -94,7 +93,6 @@ def test_what_has_no_lagrangian_is_refused_in_a_sentence(name: str) -> None:
 def test_of_several_forms_the_smallest_graph_counts() -> None:
     @Equation("q qd", Output("loss", (), "W"))
     def loss(system: dyn.System):  # type: ignore[no-untyped-def]
-        """Power."""
         yield [system.qd[0] * system.qd[0] + system.q[0] - system.q[0]]
         yield [system.qd[0] * system.qd[0]]
 

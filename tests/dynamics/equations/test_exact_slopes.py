@@ -1,7 +1,5 @@
 """Derivatives of random trees of bodies against 60 digits without graphs, and beside Pinocchio's errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NamedTuple
@@ -10,15 +8,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from tests.dynamics.mechanisms import (
-    TREES,
-    Array,
-    floating,
-    random_mechanism,
-    random_state,
-    random_tree,
-    turned_arm,
-)
+from tests.dynamics.mechanisms import TREES, Array, floating, random_mechanism, random_state, random_tree, turned_arm
 from tests.dynamics.tree_in_digits import Slopes, digits, exactly, floats, slopes_in_digits
 from tests.slow import slow
 

@@ -1,7 +1,5 @@
 """What both forms of the equations of motion are called in parts: tags, roles, and classes by what needs a node."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import pytest
@@ -14,6 +12,7 @@ from viz.models.node_classes import form_classes
 
 from ..mechanisms import turned_arm
 from ..models import cart_pendulum
+from .test_tags_of_equations import untagged
 
 
 def tagged_cart() -> dyn.System:
@@ -30,10 +29,6 @@ def tagged_cart() -> dyn.System:
 
 MODELS = {name: (lambda name=name: dyn.scenes.load(name)) for name in dyn.scenes.names()}
 MODELS |= {"cart": tagged_cart, "cart pendulum": cart_pendulum, "arm": lambda: turned_arm(5)}
-
-
-def untagged(graph: Graph) -> list[Node]:
-    return [node for node in graph.nodes if node.args and not node.tags]
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -1,7 +1,5 @@
 """Hamilton's equations: those of Lagrange in (q, p), the slopes of H, and what they say where there are none."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -14,7 +12,7 @@ from dynamics import as_system
 from dynamics.systems.model import as_ode
 
 from ..linkages import four_bar
-from ..mechanisms import random_body, random_joint, turned_arm
+from ..mechanisms import random_body, random_joint
 from ..models import MODELS, cart_pendulum, oscillator, relativistic
 
 EQUAL = 1e-13  # of the largest of its kind: some hundred roundings
@@ -150,15 +148,6 @@ def test_the_energy_has_the_equations_as_its_slopes(model: Any) -> None:
         damping = np.array([float(each) for each in system.damping])
         applied = np.array([at[f"tau{i}"] for i in range(system.n)]) - damping * u
         near(values(graph, at, "p"), applied - values(cg.gradient(total, names), at), np.abs(applied).max())
-
-
-@pytest.mark.parametrize(
-    ("model", "most"), [(dyn.planar_arm([1.0, 0.8, 0.6], [1.0, 0.9, 0.7]), 0.95), (turned_arm(7), 0.87)]
-)
-def test_of_bodies_it_has_fewer_nodes_than_elimination_for_accelerations_but_is_deeper(model: Any, most: float) -> None:
-    momenta, velocities = dyn.hamilton_equations(model).counts(), dyn.state_equation(model, "recursive").counts()
-    assert momenta.nodes < most * velocities.nodes
-    assert momenta.depth > velocities.depth
 
 
 def test_what_has_no_such_equations_is_said() -> None:

@@ -3,8 +3,6 @@
 Those of trees of plain joints are held to other equations in test_exact_slopes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Velocities of momenta where L is not quadratic: those that the momenta are of, over all their sizes and units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -59,9 +57,7 @@ def there_and_back(system: dyn.System, qd: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 @pytest.mark.parametrize(
-    "names",
-    [*QUICK, *slow(*[[name] for name in TERMS if [name] not in QUICK], ["relativistic", "cosh"])],
-    ids="+".join,
+    "names", [*QUICK, *slow(*[[name] for name in TERMS if [name] not in QUICK], ["relativistic", "cosh"])], ids="+".join
 )
 def test_the_velocities_of_momenta_are_those_that_they_are_of(names: list[str]) -> None:
     system, qd = mixed(names, len(names))

@@ -1,7 +1,5 @@
 """Linearization against differences of other programs' accelerations, Pinocchio's derivatives, and closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 from unittest.mock import patch
 
@@ -101,6 +99,8 @@ def test_of_no_states_there_are_no_matrices_and_one_state_is_refused() -> None:
     assert b.shape == (0, 4, 2)
     with pytest.raises(ValueError, match="rows of states"):
         dyn.linearize_many(random_arm(2), np.zeros(2), np.zeros(2))
+    with pytest.raises(ValueError, match="as many rows, or one, got 2 of qd after 3"):
+        dyn.linearize_many(random_arm(2), np.zeros((3, 2)), np.zeros((2, 2)))
 
 
 def bead(q, qd, t):  # type: ignore[no-untyped-def]
@@ -122,8 +122,3 @@ def test_a_state_that_cannot_be_linearized_is_refused(name: str) -> None:
     model, q, qd, others, message = REFUSED[name]
     with pytest.raises(ValueError, match=message):
         linearize(model, q, qd, **others)  # type: ignore[arg-type]
-
-
-def test_rows_of_a_horizon_are_as_many() -> None:
-    with pytest.raises(ValueError, match="as many rows, or one, got 2 of qd after 3"):
-        dyn.linearize_many(random_arm(2), np.zeros((3, 2)), np.zeros((2, 2)))

@@ -1,16 +1,11 @@
 """Inverse dynamics by velocities: trees of all joints and random Lagrangians, beside the chain rule in 60 digits."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import cgraph as cg
 import dynamics as dyn
 from dynamics import Mechanism
-from tests.dynamics.mechanisms import (
-    TREES as MODELS,
-    random_state,
-)
+from tests.dynamics.mechanisms import TREES as MODELS, random_state
 from tests.high_precision import evaluate
 
 DIGITS = 60

@@ -1,7 +1,5 @@
 """Random Lagrangians: the inverse dynamics by default, and by velocities, beside that of the paper's chain rule."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

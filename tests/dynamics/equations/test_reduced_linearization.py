@@ -1,7 +1,5 @@
 """Linearization on constraints: against minimal coordinates, published modes, and differences along the constraint."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

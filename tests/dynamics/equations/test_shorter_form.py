@@ -1,7 +1,5 @@
 """Identities: what a scene does not need is seen, no digits are lost for it, and graphs are no longer than SymPy's."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,6 @@ RELATIVE = 1e-9  # of entries at random points: what varies by less is constant
 
 
 def values(graph: cg.Graph, at: dict[str, np.ndarray]) -> np.ndarray:
-    """Outputs at the points, (outputs, points)."""
     result = graph.evaluate({name: at[name] for name in graph.input_names})
     return np.array([np.broadcast_to(value, POINTS) for value in result.values()])
 

@@ -1,7 +1,5 @@
 """Mass matrices that are not positive definite at one state: seen, and the coordinate named."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
@@ -96,11 +94,6 @@ def test_the_first_of_thirty_that_fails_is_named_in_a_batch_with_its_state():
     for name, column in zip(["m0", "m29"], columns.T, strict=False):
         column[graph.input_names.index(name)] = -1.0
         assert system.coordinates[int(run(column)[-1]) - 1] == f"bead {name[1:]}"
-
-
-def test_without_asking_nothing_is_added():
-    arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
-    assert "info" not in forward_dynamics(arm).outputs
 
 
 def test_a_coordinate_without_inertia_is_an_error_at_once():

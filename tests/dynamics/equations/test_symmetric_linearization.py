@@ -1,7 +1,5 @@
 """The linearization in (q, p): Hamilton's equations differentiated, and what their structure says of it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +21,7 @@ from ..mechanisms import random_joint, random_mechanism, turned_arm
 from ..models import cart_pendulum, coupled_springs, driven_pendulum, magnetic, random_arm, relativistic
 from .test_hamiltonian import point, random_tree, rotor, values
 from .test_inverse_dynamics_derivatives import KINDS
+from .test_linearization import bead
 
 EQUAL = 1e-12  # of the largest entry
 RARE = ("along one axis", "pulled")
@@ -138,11 +137,6 @@ def test_of_a_chain_it_keeps_the_digits_whatever_the_condition_of_its_mass_matri
     for rows in (slice(n), slice(n, None)):
         for columns in (slice(n), slice(n, None)):
             assert wrong[rows, columns].max() < 5e-13 * np.abs(expected[rows, columns]).max()
-
-
-def bead(q: Any, qd: Any, t: Any) -> cg.Node:
-    """Without inertia at 0."""
-    return 0.5 * q[0] ** 2 * qd[0] ** 2 - q[0]
 
 
 def test_what_has_no_such_linearization_is_said() -> None:

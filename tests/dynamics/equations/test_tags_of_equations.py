@@ -1,7 +1,5 @@
 """Tags on the equations of motion: every node says where it comes from, and gravity can be told from the rest."""
 
-from __future__ import annotations
-
 import pytest
 
 import cgraph as cg
@@ -25,10 +23,7 @@ def untagged(graph: cg.Graph) -> list[cg.Node]:
 @pytest.mark.parametrize("model", MODELS)
 def test_every_operation_has_a_tag_and_some_come_of_the_potential(model: str, graph: str) -> None:
     derived = GRAPHS[graph](MODELS[model]())
-    rewritten = (model, graph) == (
-        "two_link",
-        "derivatives",
-    )  # by identities, whose nodes come of several parts at once
+    rewritten = (model, graph) == ("two_link", "derivatives")  # by identities: nodes come of several parts at once
     assert rewritten or untagged(derived) == []
     assert [node for node in derived.nodes if "potential" in node.tags]
 

@@ -1,7 +1,5 @@
 """Torque by link and by motion: what the parts are, that they add up, and how tables are written."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

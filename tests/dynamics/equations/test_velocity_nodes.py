@@ -1,7 +1,5 @@
 """Velocity nodes of a Lagrangian: which are recognized, that they are time derivatives, and the bias made of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -127,9 +125,3 @@ def test_the_bias_is_what_the_chain_rule_gives_without_accelerations(name):
         scale = 1.0 + max(abs(x) for x in truth.values())
         for a, b in zip(truth.values(), result.values(), strict=True):
             assert abs(a - b) < FOLDED * scale
-
-
-def test_a_chain_s_bias_needs_fewer_nodes_than_its_inverse_dynamics_at_rest():
-    arm = dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])
-    by_chain_rule = cg.specialize(dyn.inverse_dynamics(arm, "chain_rule"), {"qdd0": 0.0, "qdd1": 0.0, "qdd2": 0.0})
-    assert len(bias(arm).nodes) < 0.8 * len(by_chain_rule.nodes)

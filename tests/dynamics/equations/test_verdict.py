@@ -1,7 +1,5 @@
 """The verdict on a formulation: against numbers of 60 digits, for random systems in any units and for named ones."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable
 from pathlib import Path

@@ -29,7 +29,6 @@ CHAOS, LOST = 1e-13, 1e-2  # errors of an end, in sizes: one that is not known, 
 
 
 def of_end(end: Reference) -> dict[str, Any]:
-    """What a file says of an end."""
     return {"x": list(end.decimal[-1]), "error": end.error, "how": end.how}
 
 
@@ -122,7 +121,6 @@ def _two_runs(
 
 
 def write(file: Path, entries: dict[str, Any], indent: int) -> None:
-    """The file of these entries."""
     file.write_text(json.dumps(entries, indent=indent) + "\n", encoding="utf-8")
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from pytest import approx, mark, param, raises
+from pytest import approx, mark, param
 
 import dynamics as dyn
 from dynamics.equations.state_equation import state_equation, state_inputs
@@ -392,8 +392,3 @@ def test_the_stiffer_the_spring_the_nearer_the_rigid_rod() -> None:
         assert found is not None
         distance = np.max(np.abs(found.x[0, [1, 3]] - rod.x[0]))
         assert distance < (100.0 * 9.81 / k if case.series else LAST_BITS)
-
-
-def test_a_name_that_is_none_is_refused() -> None:
-    with raises(ValueError, match="there is no case 'x'; the cases are"):
-        cases.load("x")

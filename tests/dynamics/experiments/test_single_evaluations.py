@@ -109,9 +109,6 @@ def test_a_constant_that_is_off_is_seen() -> None:
     assert not single_evaluations.measurement(single_evaluations.FAMILIES[0], arms).meets
 
 
-# Huge angles
-
-
 def test_angles_fill_their_range_with_both_signs() -> None:
     found = single_evaluations.angles(6.0, 9.0, 1000)
     assert np.min(np.abs(found)) >= 1e6

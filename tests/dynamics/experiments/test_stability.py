@@ -32,9 +32,6 @@ STORED = 1e-14  # relative to a state's size: constants of the graph are rounded
 NO_ERROR = 1e-12  # of a straight line's drift: rounding of the means
 
 
-# Verdicts
-
-
 def measurement(value: float, bound: float = 1.0) -> Measurement:
     return Measurement("error", value, bound, "of size", "for the test")
 
@@ -72,9 +69,6 @@ def test_every_limit_is_of_a_row_that_exists_and_is_told_in_the_documentation() 
         assert case in {"Cases": set(cases.names()), "Single evaluations": single}[section]
         assert method == "" or method in case_runs.methods_of(cases.load(case))
         assert case in " ".join(text.split())
-
-
-# Solutions
 
 
 def test_the_file_has_a_solution_of_every_case_whose_error_is_measured() -> None:
@@ -122,9 +116,6 @@ def test_a_case_with_another_start_is_computed_anew() -> None:
     found = replace(cases.load("exponential decay"), t_end=1.0).solution()
     assert found is not None
     assert found.x[0, 0] == math.exp(-1.0)
-
-
-# Runs of cases
 
 
 def broken() -> Method:
@@ -180,9 +171,6 @@ def test_an_invariant_is_measured_by_its_scale_and_what_is_missing_is_no_number(
     assert math.isnan(case_runs.measurement(energy, {}).value)
 
 
-# Long runs
-
-
 def test_the_drift_of_a_line_is_its_slope_and_that_of_an_oscillation_is_none() -> None:
     t = np.arange(100_001) / 1e5
     wave = 0.01 * np.sin(2.0 * math.pi * 1234.5 * t)
@@ -216,19 +204,12 @@ def test_a_method_that_loses_energy_is_seen_to(motion: str) -> None:
     assert energy_drift.result(motion, "rk4", energy_drift.QUICK).verdict == "unexplained"
 
 
-# The table
-
-
 ROWS = [
     result(measurement(0.5), measurement(1e-9), steps=120, rejected=3, seconds=0.25),
     result(measurement(2.0), reason="a reason " * 20, steps=10),
     result(measurement(math.nan), stopped="stopped at t = 1 s"),
     CaseResult(
-        "Sine and cosine",
-        "a name longer than a column of the table has room for",
-        "",
-        "llvm",
-        (measurement(0.1),),
+        "Sine and cosine", "a name longer than a column of the table has room for", "", "llvm", (measurement(0.1),)
     ),
 ]
 

@@ -1,7 +1,5 @@
 """Figures as text, and runs in turns."""
 
-from __future__ import annotations
-
 import time
 from functools import partial
 

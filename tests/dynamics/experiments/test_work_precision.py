@@ -1,7 +1,5 @@
 """Error and run time: errors are those of closed forms, orders are those declared."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json
@@ -18,15 +16,7 @@ from dynamics.experiments.accuracy_task import INTERVALS, AccuracyTask
 from dynamics.experiments.work_precision import measurement
 from dynamics.experiments.work_precision.measurement import FLOOR_ERROR, ErrorMetrics
 from dynamics.experiments.work_precision.named_tasks import load, names
-from dynamics.experiments.work_precision.trajectory_runs import (
-    CHOSEN,
-    EQUAL,
-    Ours,
-    Outcome,
-    Run,
-    Solver,
-    problem_of,
-)
+from dynamics.experiments.work_precision.trajectory_runs import CHOSEN, EQUAL, Ours, Outcome, Run, Solver, problem_of
 from dynamics.experiments.work_precision.work_precision import (
     Curve,
     Point,
@@ -170,14 +160,12 @@ def test_csv_and_json_hold_the_points(report: WorkPrecision) -> None:
 
 
 def exact_motion(found: AccuracyTask, digits: int) -> Reference:
-    """The task's own, at its times."""
     exact = found.solution(found.times, digits=digits)
     assert exact is not None
     return exact
 
 
 def task(name: str, **options: Any) -> tuple[AccuracyTask, ErrorMetrics, float]:
-    """A task with its exact motion, to twenty digits."""
     found = load(name, **options)
     metrics = ErrorMetrics(found, exact_motion(found, 20))
     return found, metrics, metrics.smallest

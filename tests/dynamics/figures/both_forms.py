@@ -5,8 +5,6 @@ python -m tests.dynamics.figures.both_forms linearizations   nodes and times of 
 python -m tests.dynamics.figures.both_forms orders           M^-1 tau by both orders of elimination: also steps by units
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -59,12 +57,10 @@ class Figure(NamedTuple):
 
     @property
     def head(self) -> tuple[str, ...]:
-        """Names of the columns of counts."""
         return (*self.sizes, *[f"{n} units" for n in self.units])
 
 
 def called(graph: Graph) -> Way:
-    """A bound call."""
     compiled = cg.compile(graph)
     return compiled.bind(_point(graph), np.empty(compiled.n_out)), 1
 
@@ -79,7 +75,6 @@ def looped(graph: Graph) -> Way:
 
 
 def batched(graph: Graph) -> Way:
-    """A batch of states."""
     compiled, out = cg.compile(graph), np.empty((len(graph.outputs), POINTS))
     aside = np.random.default_rng(1).uniform(-0.1, 0.1, (compiled.n_in, POINTS))
     points = np.ascontiguousarray(_point(graph)[:, np.newaxis] + aside)

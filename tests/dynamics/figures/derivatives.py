@@ -1,7 +1,5 @@
 """Pictures of derivatives: estimates beside what they estimate, and paths painted by how much depends on a number."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING

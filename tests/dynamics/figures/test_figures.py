@@ -1,7 +1,5 @@
 """Figures of pages that no command prints."""
 
-from __future__ import annotations
-
 import pytest
 
 import cgraph as cg

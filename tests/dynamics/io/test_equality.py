@@ -1,7 +1,5 @@
 """Equality constraints of MJCF: the same rows and accelerations as MuJoCo's model has them, but exact; and the rest."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -55,7 +53,6 @@ def text_of(equality: str, option: str = "") -> str:
 
 
 def rows(model: Any, data: Any, q: Array) -> tuple[Array, Array]:
-    """MuJoCo's constraints and their Jacobian."""
     data.qpos[:] = q
     mujoco.mj_forward(model, data)
     return np.array(data.efc_pos), np.array(data.efc_J).reshape(-1, model.nv)
@@ -110,10 +107,7 @@ def test_what_is_soft_inactive_or_off_is_said() -> None:
     joint, off = CONSTRAINTS["one joint"], GEAR.replace("/>", ' active="false"/>')
     with warns(dyn.MechanismWarning, match="left out softness of equality constraints"):
         loaded = dyn.load_mjcf(text_of(joint + off))
-    assert loaded.left_out == (
-        "softness of equality constraints (number 0)",
-        "inactive equality constraints (gear)",
-    )
+    assert loaded.left_out == ("softness of equality constraints (number 0)", "inactive equality constraints (gear)")
     assert len(loaded.loops) == 1
     none = dyn.load_mjcf(text_of(joint + off, '<option><flag equality="disable"/></option>'))
     assert (none.loops, none.left_out) == ((), ())

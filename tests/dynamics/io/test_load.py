@@ -1,7 +1,5 @@
 """Mechanisms read from MJCF: MuJoCo's own accelerations, the frames and defaults, and what is left out."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 from collections.abc import Iterator
@@ -87,16 +85,11 @@ def mjcf(worldbody: str, rest: str = "") -> str:
 INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" fullinertia="0.3 0.4 0.5 0.01 0.02 -0.03"/>'
 HINGE = f'<body name="a"><joint name="j"/>{INERTIAL}</body>'
 
-# --- there and back
-
 
 def test_any_name_comes_back() -> None:
     names = ["a/b", 'say "hi"', "<&>"]
     mechanism = Mechanism([Body(name, Joint("revolute", (0, 1, 0)), mass=1.0, center=(1, 0, 0)) for name in names])
     assert [body.name for body in dyn.load_mjcf(dyn.to_mjcf(mechanism)).bodies] == names
-
-
-# --- frames and defaults
 
 
 def test_a_model_by_hand_agrees() -> None:
@@ -160,9 +153,6 @@ def test_names_are_mujoco_s_or_new_ones() -> None:
     assert [body.name for body in mechanism.moving] == ["body 2", "body 2' x", "body 2'", "c", "d"]
 
 
-# --- sources
-
-
 def test_a_path_a_text_and_a_model_are_the_same(tmp_path: Path) -> None:
     file = tmp_path / "model.xml"
     file.write_text(mjcf(HINGE), encoding="utf-8")
@@ -173,13 +163,9 @@ def test_a_path_a_text_and_a_model_are_the_same(tmp_path: Path) -> None:
 
 
 @mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
-def test_a_missing_file_is_named(load: Any, tmp_path: Path) -> None:
+def test_what_is_no_source_is_said(load: Any, tmp_path: Path) -> None:
     with raises(MechanismError, match=r"^there is no file '.*nowhere\.xml'$"):
         load(tmp_path / "nowhere.xml")
-
-
-@mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
-def test_what_is_no_source_is_said(load: Any) -> None:
     with raises(MechanismError, match=r"^a model is a path or XML text, and of MJCF an MjModel, too, got int$"):
         load(3)
 
@@ -256,8 +242,6 @@ def test_more_copies_than_are_made_in_seconds_are_refused(count: tuple[str, ...]
     assert dyn.load_mjcf(text.replace(f'"{count[0]}"', '"3"')).coordinates == ("j",)
 
 
-# --- what is not modelled
-
 BALL = f'<body name="b"><joint name="ball" type="ball" stiffness="2"/>{INERTIAL}</body>'
 FREE = f'<body name="f" pos="0 0 2"><freejoint name="root"/>{INERTIAL}{HINGE}</body>'
 TENDON = '<tendon><fixed name="string" stiffness="3"><joint joint="j" coef="1"/></fixed></tendon>'
@@ -272,14 +256,10 @@ NOT_MODELLED = [
 
 
 @each_row(("text", "what"), NOT_MODELLED)
-def test_what_is_not_modelled_is_refused_by_name(text: str, what: str) -> None:
+def test_what_is_not_modelled_is_refused_by_name_or_left_out_on_request(text: str, what: str) -> None:
     message = f"a mechanism cannot have {what} (the option ignore leaves this out)"
     with raises(MechanismError, match=f"^{re.escape(message)}$"):
         dyn.load_mjcf(text)
-
-
-@each_row(("text", "what"), NOT_MODELLED)
-def test_what_is_not_modelled_is_left_out_on_request(text: str, what: str) -> None:
     with warns(dyn.MechanismWarning, match=f"^the given text: left out {re.escape(what)}$"):
         mechanism = dyn.load_mjcf(text, ignore=True)
     assert mechanism.left_out == (what,)
@@ -346,9 +326,6 @@ def test_what_acts_from_outside_is_left_out_with_a_warning_and_no_error() -> Non
     assert dyn.scenes.Scene("a", "", loaded, (0.0,), (0.0,), 1.0).left_out == loaded.left_out
 
 
-# --- odd numbers and warnings
-
-
 @mark.parametrize("number", ["nan", "inf"])
 @each_row("attribute", ["stiffness", "damping", "armature", "ref", "pos", "axis"])
 def test_a_number_that_is_not_finite_is_one_sentence(
@@ -375,9 +352,6 @@ def test_other_warnings_of_mujoco_are_python_s(monkeypatch: Any) -> None:
     with warns(UserWarning, match="^MuJoCo on the given text: this is odd$"):
         dyn.load_mjcf(mjcf(HINGE))
     assert mujoco.get_mju_user_warning() is before
-
-
-# --- models nobody here wrote
 
 
 def files() -> Iterator[Path]:

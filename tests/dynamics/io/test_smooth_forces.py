@@ -35,14 +35,12 @@ ROBOT = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass v
 
 
 def compiled(flags: str = "", more: str = "") -> Any:
-    """MuJoCo's model of it, where there is MuJoCo."""
     mj = pytest.importorskip("mujoco").MjModel.from_xml_string(MODEL.format(flags=flags, more=more))
     mj.opt.disableactuator = 1 << 2
     return mj
 
 
 def silently(mj: Any, **options: Any) -> dyn.Mechanism:
-    """The mechanism, whatever is left out."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dyn.MechanismWarning)
         return dyn.load_mjcf(mj, **options)
@@ -81,8 +79,7 @@ def test_what_is_taken_is_not_left_out_and_the_rest_is() -> None:
         "actuators that act with no input",
     ]
     with pytest.warns(
-        dyn.MechanismWarning,
-        match=r"left out contacts \(.*\); actuators that act with no input .memory",
+        dyn.MechanismWarning, match=r"left out contacts \(.*\); actuators that act with no input .memory"
     ):
         model = dyn.load_mjcf(mj, **SMOOTH)
     kinds = [type(force).__name__ for force in model.forces]

@@ -1,7 +1,5 @@
 """Mechanisms written and read again: random trees of any size and scale are the same, or are refused in a sentence."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from typing import Any
@@ -196,10 +194,7 @@ def test_welds_frames_and_locks_come_back() -> None:
         ({"mass": 1e-20, "inertia": (1, 1, 1)}, "and body 'a' has a mass of 1e-20 kg"),
         ({"mass": 1.0, "inertia": (1, 1, 1e-16)}, "and body 'a' has a moment of inertia of 1e-16 kg m^2"),
         ({"mass": 1e-9, "center": (1e-6, 0, 0)}, "and body 'a' has a moment of inertia of 0, where 1e-21 kg m^2 turn"),
-        (
-            {"mass": 1.0, "inertia": (1, 2, 4)},
-            "MuJoCo takes no body with principal moments [1.0, 2.0, 4.0], as",
-        ),
+        ({"mass": 1.0, "inertia": (1, 2, 4)}, "MuJoCo takes no body with principal moments [1.0, 2.0, 4.0], as"),
     ],
 )
 @mark.filterwarnings("ignore:body 'a'. no body has:dynamics.MechanismWarning")

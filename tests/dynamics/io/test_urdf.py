@@ -1,7 +1,5 @@
 """Mechanisms read from URDF: numbers of the file, frames, what is left out, and a sentence for what is wrong."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path
@@ -61,9 +59,6 @@ def mass_matrix(mechanism: Mechanism) -> Array:
     n = mechanism.system.n
     at = {f"{name}{i}": 0.0 for name in ("q", "qd") for i in range(n)}
     return np.reshape(list(dyn.mass_matrix(mechanism).evaluate(at).values()), (n, n))
-
-
-# --- the numbers of the file
 
 
 def test_a_urdf_arm_is_what_it_says() -> None:
@@ -143,9 +138,6 @@ def test_an_axis_that_is_not_written_is_x() -> None:
     assert np.asarray(loaded.moving[0].joint.axis).tolist() == [1.0, 0.0, 0.0]
 
 
-# --- beside other readers
-
-
 def random_urdf(rng: np.random.Generator, n: int, *, massless: bool = False) -> str:
     """A tree of n hinges, slides and welds, with every frame turned.  massless: some links that move have no mass."""
 
@@ -181,9 +173,6 @@ def test_mujoco_reads_the_same(seed: int) -> None:
         module.mj_inverse(mj, data)
         worst = max(worst, error(inverse(x.ravel()), data.qfrc_inverse[order]))
     assert worst < EQUATIONS
-
-
-# --- what is left out
 
 
 def test_what_acts_from_outside_is_left_out_with_a_warning() -> None:
@@ -309,8 +298,6 @@ def test_moments_that_rounding_makes_negative_are_zero_and_said(digits: int, uni
     assert kinds == {(False, False), (False, True), (True, True)}
 
 
-# --- joints that mimic others
-
 AXIS = '<axis xyz="0 1 0"/><origin xyz="0.1 0 0.2"/>'
 
 
@@ -382,8 +369,6 @@ def test_a_fixed_joint_that_mimics_another_stays_fixed_and_is_said() -> None:
     assert [loop.body for loop in loaded.loops] == ["inner"]
 
 
-# --- what is wrong
-
 HINGE = joint("j", "continuous", "base", "a", '<axis xyz="0 0 1"/>')
 A, BASE = link("a", 1.0, np.eye(3)), link("base")
 WRONG = [
@@ -445,9 +430,6 @@ def test_what_is_wrong_is_one_sentence(text: str, message: str, tmp_path: Path) 
     file.write_text(text)
     with raises(MechanismError, match=re.escape(str(file))):
         dyn.load_urdf(file)
-
-
-# --- sources
 
 
 @mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16"])

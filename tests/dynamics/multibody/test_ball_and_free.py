@@ -1,7 +1,5 @@
 """Ball and free joints: every graph against MuJoCo, against the other formulations, and against joints of one axis."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cylindrical, universal and planar joints: the slides and hinges that they are made of, written by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Contacts: their laws, beside closed forms; action and reaction; units; smoothness; and what cannot be one."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import replace
@@ -24,7 +22,6 @@ RADIUS, MASS, GRAVITY = 0.1, 2.0, 9.81
 
 
 def ball(name: str = "ball", **others: Any) -> dyn.Body:
-    """A ball of even density, free."""
     moment = 0.4 * MASS * RADIUS**2
     return dyn.Body(name, dyn.Joint("free"), mass=MASS, inertia=(moment, moment, moment), **others)
 
@@ -65,9 +62,6 @@ def evaluated(mechanism: dyn.Mechanism, contact: dyn.Contact, q: Any, qd: Any) -
     return dyn.arrays_at(mechanism, mechanism.contact(contact), q=q, qd=qd)
 
 
-# --- closed forms
-
-
 @each_row("d, unit", [(d, unit) for d in (0.1, 1.0, 5.0) for unit in (1.0, 1e-9)])
 def test_a_body_is_thrown_back_as_hunt_and_crossley_say(d: float, unit: float) -> None:
     """d v (1 + e) = log((1 + d v) / (1 - d e v)), in meters and nanometers."""
@@ -106,9 +100,6 @@ def test_on_a_slope_a_block_creeps_as_stated() -> None:
     sink = (MASS * GRAVITY * math.cos(slope) / MATERIAL["stiffness"]) ** (2.0 / 3.0)
     run = dyn.simulate(dyn.Mechanism([slide, block], pull, [ground]), [-sink, 0.0], [0.0, 0.0], 1.0, "rodas")
     assert run.qd[-1] == approx([0.0, slow * s / math.sqrt(1.0 - s * s)], abs=1e-6 * slow)
-
-
-# --- laws
 
 
 def test_the_force_never_pulls_and_friction_stays_below_its_bound() -> None:
@@ -193,9 +184,6 @@ def test_in_a_turned_frame_a_contact_is_the_same() -> None:
     assert np.abs(first - second).max() < EQUATIONS * np.abs(first).max()
 
 
-# --- derivatives
-
-
 def test_slopes_are_there_at_the_touch_and_apart() -> None:
     """First and second, forward and reverse: 0 apart and at the touch, and never NaN."""
     model = on_ground()
@@ -229,9 +217,6 @@ def test_a_gradient_through_a_landing_is_that_of_differences() -> None:
         assert float(found.gradients[name]) * value == approx((high - low) / 2e-4, abs=DIFFERENCES)
     low, high = (end([0.0, 0.0, 0.15 + sign * 1e-5, 1.0, 0.0, 0.0, 0.0], qd, values) for sign in (-1.0, 1.0))
     assert found.gradients["q"][2] == approx((high - low) / 2e-5, abs=DIFFERENCES)
-
-
-# --- as part of a mechanism
 
 
 def test_parameters_of_a_contact_are_inputs_and_are_bound() -> None:

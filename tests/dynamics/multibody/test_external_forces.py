@@ -1,7 +1,5 @@
 """Forces on bodies: virtual work by differences, what they are made of, and what cannot be one."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -58,9 +56,6 @@ def work(graphs: list[cg.Graph], q: Array, value: Array, torque: Array, step: fl
     return np.array(rates)
 
 
-# --- by other means
-
-
 MODELS: dict[str, Callable[[], Mechanism]] = {name: lambda make=make: make(7) for name, make in FAMILIES.items()} | {
     "a turned slide across two axes": lambda: Mechanism(
         [Body("cart", Joint("prismatic", (1.0, 1.0, 0.0), orientation=from_quaternion([1, 2, 3, 4])), mass=1.0)]
@@ -95,9 +90,6 @@ def test_accelerations_take_the_force_that_torques_do() -> None:
     for method in ("auto", "recursive", "dense"):
         qdd = run(dyn.forward_dynamics(mechanism, method), given)
         assert error(run(dyn.inverse_dynamics(mechanism), given | {"qdd": qdd}), given["tau"]) < AGREEMENT
-
-
-# --- graphs
 
 
 def test_forces_are_tagged_with_their_body() -> None:
@@ -137,9 +129,6 @@ def test_bodies_and_forces_may_come_from_iterators() -> None:
     assert len(read.bodies) == 3
 
 
-# --- what cannot be
-
-
 ROTOR = Mechanism([Body("rotor", Joint("revolute"), inertia=(1.0, 1.0, 1.0))])
 COMPONENT = "the force on body 'rotor': a component of {} must be a finite number, a parameter's name or a node,"
 BAD: dict[str, tuple[Any, str]] = {
@@ -162,18 +151,9 @@ BAD: dict[str, tuple[Any, str]] = {
         "the force on body 'rotor': value must have three components, got (1, 0)",
     ),
     "text": ([Force("rotor", "fxy")], "the force on body 'rotor': value must have three components, got 'fxy'"),
-    "a number": (
-        [Force("rotor", torque=2.0)],
-        "the force on body 'rotor': torque must have three components, got 2.0",
-    ),
-    "infinite": (
-        [Force("rotor", (0, np.inf, 0))],
-        f"{COMPONENT.format('value')} got inf",
-    ),
-    "none": (
-        [Force("rotor", torque=(0, None, 0))],
-        f"{COMPONENT.format('torque')} got None",
-    ),
+    "a number": ([Force("rotor", torque=2.0)], "the force on body 'rotor': torque must have three components, got 2.0"),
+    "infinite": ([Force("rotor", (0, np.inf, 0))], f"{COMPONENT.format('value')} got inf"),
+    "none": ([Force("rotor", torque=(0, None, 0))], f"{COMPONENT.format('torque')} got None"),
 }
 
 

@@ -1,7 +1,5 @@
 """Limits of joints as numbers: from files, to files, and where they are shown; beside MuJoCo's and Pinocchio's."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle
@@ -13,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import cgraph as cg
 import dynamics as dyn
 from dynamics.multibody.bodies.limits import ANYTHING
 from tests.each_row import each_row
@@ -80,17 +77,6 @@ def test_mujoco_reads_what_is_written() -> None:
 
 
 @LEFT_OUT
-def test_those_of_urdf_are_pinocchios() -> None:
-    pin, arm = pytest.importorskip("pinocchio"), dyn.load_urdf(ROBOT)
-    model: Any = pin.buildModelFromXML(ROBOT)
-    for name, each in arm.limits.items():
-        joint = model.joints[model.getJointId(name)]
-        assert (model.velocityLimit[joint.idx_v], model.effortLimit[joint.idx_v]) == (each.velocity[1], each.effort[1])
-        if joint.nq == 1:
-            assert (model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]) == each.position
-
-
-@LEFT_OUT
 def test_those_of_mjcf_are_mujocos() -> None:
     mujoco = pytest.importorskip("mujoco")
     arm, model = dyn.load_mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
@@ -110,13 +96,6 @@ def test_those_of_mjcf_are_mujocos() -> None:
         high.append(data.qfrc_actuator[:2].copy())
     assert np.min(low, axis=0) == pytest.approx([-8.0, -2.0])
     assert np.max(high, axis=0) == pytest.approx([5.0, 10.0])
-
-
-@LEFT_OUT
-def test_the_equations_are_those_without() -> None:
-    free = re.sub("<limit[^>]*>", "", ROBOT)
-    graphs = [dyn.forward_dynamics(dyn.load_urdf(text)) for text in (ROBOT, free)]
-    assert cg.structure_hash(graphs[0]) == cg.structure_hash(graphs[1])
 
 
 def test_a_joint_of_several_coordinates_has_one_for_each() -> None:

@@ -1,7 +1,5 @@
 """Linkages whose axes are tilted a little move as those whose axes are exact, or a warning names the rows."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from collections import Counter

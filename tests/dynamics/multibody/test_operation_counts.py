@@ -1,7 +1,5 @@
 """Operations of robots' equations: no row of the page grows, and published formulas are as they were printed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,14 +9,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from tests.bench.speed.counts import (
-    QUANTITIES,
-    ROBOTS,
-    VARIANTS,
-    models,
-    operation_counts,
-    operations,
-)
+from tests.bench.speed.counts import QUANTITIES, ROBOTS, VARIANTS, models, operation_counts, operations
 from tests.each_row import each_row
 from tests.slow import slow
 from viz.paper.mechanisms import turned_arm

@@ -44,9 +44,6 @@ def assert_alike(left: cg.Graph, right: cg.Graph) -> None:
         assert found == approx(expected, abs=AGREEMENT * max(1.0, np.abs(expected).max()))
 
 
-# --- bodies that move in a plane, and inertia that no motion shows: against energies in the world's axes
-
-
 def in_planes(seed: int) -> dyn.Mechanism:
     """A tree of hinges and slides, most along one axis, some against it, some across; gravity any, along, or none."""
     rng = np.random.default_rng(seed)
@@ -129,12 +126,6 @@ def test_what_regrouping_saves() -> None:
               for name, model in (("paper", PAPER), ("arm of 7", turned_arm(7)))}  # fmt: skip
     assert counts == {"paper": [(97, 97), (160, 141)], "arm of 7": [(774, 774), (1427, 1427)]}
     assert all(link.mass == 0.0 for link in replace(turned_arm(7), base_parameters=True).links)
-
-
-# --- the paper's scene
-
-
-# --- effects
 
 
 @mark.parametrize("model", [PAPER, arm(3), turned_arm(3)], ids=["paper", "arm", "turned arm"])
@@ -220,9 +211,6 @@ def test_bodies_without_mass_and_welds_leave_nothing() -> None:
     assert "cross" not in {tag for node in wrist.system.partial_lagrangians[3].args for tag in node.tags}
     rows = {each.what: each for each in dyn.prune(wrist).absent}
     assert rows["mass of cross"].nodes > 0
-
-
-# --- locked joints, outputs and inputs
 
 
 def test_a_locked_joint_leaves_the_shorter_arm_s_nodes() -> None:

@@ -1,7 +1,5 @@
 """Every public function of a model, of one with a loop: of the whole, or of its tree, as its documentation says."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from dataclasses import replace
@@ -87,7 +85,6 @@ ELSEWHERE = {
 
 
 def of_models() -> list[str]:
-    """Public functions whose first argument is a model."""
     functions = {name: getattr(dyn, name) for name in dyn.__all__ if inspect.isfunction(getattr(dyn, name))}
     first = {name: [*inspect.signature(function).parameters, ""][0] for name, function in functions.items()}
     return [name for name, argument in first.items() if argument in ("model", "mechanism")]

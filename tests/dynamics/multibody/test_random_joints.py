@@ -4,8 +4,6 @@ Every graph of a mechanism is held against the same tree with a chain of joints 
 joint, against Lagrange's equations by differences of the energies, and against the dense equations of M and the bias.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -177,7 +175,6 @@ def _state(given: Twins, seed: int) -> tuple[dict[str, Array], dict[str, Array]]
 
 
 def _values(graph: cg.Graph, state: dict[str, Array]) -> Array:
-    """All outputs in a row."""
     named = {f"{name}{k}": float(x) for name, row in state.items() for k, x in enumerate(row)}
     if "dt" in graph.input_names:  # embedded: with the state before
         old = {"q": state["q"] - 1e-3 * state["qd"], "qd": state["qd"] - 1e-3 * state["qdd"]}

@@ -1,7 +1,5 @@
 """Frames and the whole of random trees: against MuJoCo, against differences, and by what is conserved."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

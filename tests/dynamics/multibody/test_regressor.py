@@ -1,7 +1,5 @@
 """The regressor against inverse dynamics."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rolling: the benchmark bicycle, a disk, and what a plane holds."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from typing import Any

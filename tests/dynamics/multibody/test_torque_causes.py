@@ -37,7 +37,6 @@ def torque(model, q, qd, qdd):
 
 
 def part(table, word):
-    """The sum of the rows of a cause."""
     chosen = [
         row for name, row in zip(table.rows, table.values, strict=True) if name.startswith(word) or name.endswith(word)
     ]

@@ -1,7 +1,5 @@
 """Results scale with the units of mass, length and time: no threshold has a size."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Joints of a user's own whose directions depend on their coordinates: all that the joints of one axis say of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import reduce
 from unittest.mock import patch

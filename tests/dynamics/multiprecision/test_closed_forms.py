@@ -48,7 +48,6 @@ MOTIONS: dict[str, tuple[System, list[float], list[float], dict[str, Any], list[
     "harmonic": (oscillator(), [0.8], [0.5], {}, [harmonic], 0.5 * M * 0.5**2 + 0.5 * K * 0.8**2),
     "other parameters": (oscillator(), [1.0], [0.0], {"parameters": {"k": 8.0}}, [lambda t: np.cos(2.0 * t)], 4.0),
     "damped": (oscillator(damping=C), [1.0], [0.0], {}, [damped], None),
-    "damped by a force": (oscillator(forces=lambda q, qd, t: [-C * qd[0]]), [1.0], [0.0], {}, [damped], None),
     "damped by a force with a parameter": (
         oscillator(forces=lambda q, qd, t, p: [-p["c"] * qd[0]], parameters={"c": C}), [1.0], [0.0], {}, [damped], None
     ),

@@ -1,7 +1,5 @@
 """Models of Python files and modules, by name, and what is said where there is none."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 
@@ -98,7 +96,6 @@ def test_any_model_in_python_is_a_scene(name, called, coordinates, folder, capsy
         ("folder.py:system", "'folder.py' is a folder, and a model is in a file"),
         ("bare:system", "'bare' is a folder, and a model is in a file, as in 'bare/model.py:system'"),
         ("models.py", "'models.py' is a Python file: name the model in it, as in 'models.py:system'"),
-        ("models.py:", "'models.py' is a Python file: name the model in it"),
         ("models.py:sistem", "'models.py' has no 'sistem'; did you mean 'system'?"),
         ("models.py:xyz", "'models.py' has no 'xyz'; it has system, arm, scene, first"),
         ("empty.py:xyz", "'empty.py' has no 'xyz'; it has none"),

@@ -1,14 +1,12 @@
 """Scenes: by name, by file, and what neither can be."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from pytest import mark, raises, warns
+from pytest import mark, raises
 
 import dynamics as dyn
 from dynamics import MechanismError, scenes
@@ -18,7 +16,6 @@ INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" diaginertia="0.3 0.4 0.5"/>'
 MJCF = f"""<?xml version="1.0"?><!-- a hinge and a slide --><mujoco><worldbody>
 <body name="a"><joint axis="0 1 0"/>{INERTIAL}
 <body name="b"><joint type="slide"/>{INERTIAL}</body></body></worldbody></mujoco>"""
-RUBBING = MJCF.replace('axis="0 1 0"', 'axis="0 1 0" frictionloss="0.1" range="-30 30"')
 URDF = """<?xml version="1.0" encoding="utf-8"?><robot name="arm"><link name="base"/><link name="a"><inertial>
 <origin xyz="0.1 0 0.2"/><mass value="1.5"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.15"/></inertial>
 <visual><geometry><mesh filename="package://nowhere/a.stl"/></geometry></visual></link>
@@ -27,8 +24,6 @@ URDF = """<?xml version="1.0" encoding="utf-8"?><robot name="arm"><link name="ba
 
 @pytest.fixture
 def file(tmp_path: Path) -> Any:
-    """Writes a text to a file of a name."""
-
     def write(text: str, name: str = "model.xml") -> Path:
         path = tmp_path / name
         path.write_text(text, encoding="utf-8")
@@ -40,9 +35,6 @@ def file(tmp_path: Path) -> Any:
 def loaded(*arguments: Any, **options: Any) -> scenes.Scene:
     pytest.importorskip("mujoco")
     return scenes.load(*arguments, **options)
-
-
-# --- by name
 
 
 @each_row("name", scenes.names())
@@ -92,9 +84,6 @@ def test_what_is_neither_a_name_nor_a_file_is_named_with_the_scenes(name: Any) -
         scenes.load(name)
 
 
-# --- by file
-
-
 @mark.parametrize("as_given", [str, Path])
 def test_a_model_file_is_a_scene_at_rest(file: Any, as_given: type) -> None:
     path = file(MJCF, "crane.xml")
@@ -137,22 +126,11 @@ def test_urdf_is_known_by_its_root_element(file: Any, name: str) -> None:
     assert loaded(file(URDF, name)).system.coordinates == ("j",)
 
 
-def test_mjcf_may_end_in_anything(file: Any) -> None:
-    assert loaded(file(MJCF, "model.mjcf")).system.n == 2
-
-
 def test_a_file_s_name_does_not_hide_a_scene(file: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     path = file(MJCF, "chain")
     monkeypatch.chdir(path.parent)
     assert scenes.load("chain").system.n == 10
     assert loaded("./chain").system.n == 2
-
-
-def test_what_acts_from_outside_is_left_out_and_said(file: Any) -> None:
-    with warns(dyn.MechanismWarning, match=r"model\.xml': left out joint limits \(of body 'a'\); friction loss \("):
-        scene = loaded(file(RUBBING))
-    assert [each.partition(" (")[0] for each in scene.left_out] == ["joint limits", "friction loss"]
-    assert scene.system.n == 2
 
 
 @each_row(
@@ -171,13 +149,6 @@ def test_a_file_that_is_no_model_is_one_sentence(file: Any, tmp_path: Path, text
     with raises(MechanismError, match="^" + re.escape(message.format(path=str(path)))) as caught:
         loaded(path)
     assert "\n" not in str(caught.value)
-
-
-def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    folder = tmp_path / "robots.xml"
-    folder.mkdir()
-    with raises(MechanismError, match=r"^'.*robots\.xml' is a folder, and a model is a file$"):
-        loaded(folder)
 
 
 def test_bytes_that_are_no_text_are_one_sentence(tmp_path: Path) -> None:

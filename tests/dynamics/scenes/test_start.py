@@ -1,7 +1,5 @@
 """Starts of scenes: by names, and where rest would show nothing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

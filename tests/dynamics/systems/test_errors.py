@@ -24,20 +24,15 @@ _ARMS: dict[str, tuple[dict[str, Any], str]] = {
     "zero mass": ({"masses": [0.0, 1.0]}, "link 1: mass must be positive and finite, got 0.0 kg"),
     "NaN mass": ({"masses": [math.nan, 1.0]}, "link 1: mass must be positive and finite, got nan kg"),
     "infinite mass": ({"masses": [1.0, math.inf]}, "link 2: mass must be positive and finite, got inf kg"),
-    "negative length": ({"lengths": [-1.0, 1.0]}, "link 1: length must be positive and finite, got -1.0 m"),
     "zero length": ({"lengths": [1.0, 0.0]}, "link 2: length must be positive and finite, got 0.0 m"),
     "NaN length": ({"lengths": [1.0, math.nan]}, "link 2: length must be positive and finite, got nan m"),
-    "infinite length": ({"lengths": [math.inf, 1.0]}, "link 1: length must be positive and finite, got inf m"),
     "counts differ": ({"lengths": [1.0]}, "as many masses as lengths, at least one; got 2 and 1"),
     "no links": ({"masses": [], "lengths": []}, "as many masses as lengths, at least one; got 0 and 0"),
     "mass_model": ({"mass_model": "beam"}, """mass_model must be "rod" or "point", got 'beam'"""),
     "gravity": ({"gravity": math.nan}, "gravity must be finite, got nan m/s"),
     "negative damping": ({"damping": [0.1, -0.1]}, "damping must be finite and at least 0, got -0.1 for 'joint 2'"),
     "NaN damping": ({"damping": math.nan}, "damping must be finite and at least 0, got nan for 'joint 1'"),
-    "dampings differ": (
-        {"damping": [0.1] * 3},
-        "damping needs one number for each of joint 1, joint 2: 2, got 3",
-    ),
+    "dampings differ": ({"damping": [0.1] * 3}, "damping needs one number for each of joint 1, joint 2: 2, got 3"),
 }
 
 
@@ -90,11 +85,6 @@ _SYSTEMS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
         {"lagrangian": lambda q, qd, t: mass(q, qd, t) - cg.variable("stray") * q[0]},
         ValueError,
         "the system uses 'stray', which is no coordinate, parameter or t \\(it has x\\)",
-    ),
-    "foreign coordinate": (
-        {"lagrangian": lambda q, qd, t: 0.5 * cg.variable("qd1") ** 2},
-        ValueError,
-        "the system uses 'qd1', which is no coordinate",
     ),
     "foreign in forces": (
         {"forces": lambda q, qd, t: [cg.variable("wind")]},

@@ -1,7 +1,5 @@
 """Quasi-velocities that do not fit their coordinates are told apart from those that do, in any unit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -98,7 +98,6 @@ def test_a_function_that_nobody_finds_is_a_sentence() -> None:
     rows = (turning, "a System"), (scene, "a System"), (motion, "a Run"), (event, "an Event")
     for given, name in (*rows, (hold, "a SampledController")):
         with pytest.raises(
-            pickle.PicklingError,
-            match=rf"^{name} does not pickle: .*lambda.*; give it functions .* in a module by def",
+            pickle.PicklingError, match=rf"^{name} does not pickle: .*lambda.*; give it functions .* in a module by def"
         ):
             pickle.dumps(given)

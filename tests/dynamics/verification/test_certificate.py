@@ -354,21 +354,14 @@ def test_the_command_prints_a_certificate(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.filterwarnings("always::dynamics.MechanismWarning")
-@each_row(
-    ("option", "joint", "term"),
-    [
-        ("", 'type="free" stiffness="1"', "joint springs"),
-        ('<option density="1000"/>', 'name="j" axis="0 1 0"', "fluid"),
-    ],
-)
-def test_the_command_finds_what_was_left_out(option: str, joint: str, term: str, tmp_path: Any, capsys: Any) -> None:
+def test_the_command_finds_what_was_left_out(tmp_path: Any, capsys: Any) -> None:
     pytest.importorskip("mujoco")
-    body = f'<body name="a"><joint {joint}/><geom size="0.1" pos="0.2 0 0"/></body>'
+    body = '<body name="a"><joint type="free" stiffness="1"/><geom size="0.1" pos="0.2 0 0"/></body>'
     model = tmp_path / "model.xml"
-    model.write_text(f"<mujoco>{option}<worldbody>{body}</worldbody></mujoco>")
+    model.write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     assert cli.main(["certify", str(model), "--ignore", "--states", "3"]) == 1
     printed = capsys.readouterr()
-    assert f"(they agree without {term})" in printed.out
+    assert "(they agree without joint springs)" in printed.out
     assert printed.err.endswith("cgraph: model: 1 residual(s) exceed their bound: inverse dynamics = MuJoCo's\n")
 
 

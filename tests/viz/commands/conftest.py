@@ -1,7 +1,5 @@
 """What a command prints, with its exit status checked."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 
@@ -21,5 +19,4 @@ def said(capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
 
 @pytest.fixture
 def figures(said: Callable[..., str]) -> Callable[..., dict]:
-    """What it prints as data."""
     return lambda *arguments, status=0: json.loads(said(*arguments, "--json", status=status))

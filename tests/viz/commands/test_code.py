@@ -1,7 +1,5 @@
 """`cgraph code`: files that compute the equations of a scene."""
 
-from __future__ import annotations
-
 import math
 import re
 import shutil
@@ -94,10 +92,3 @@ def test_a_mistake_is_told_in_one_line_and_writes_nothing(arguments, said, here,
     (line,) = capsys.readouterr().err.splitlines()
     assert re.search(re.escape(said), line)
     assert list(here.iterdir()) == []
-
-
-def test_the_help_names_what_there_is(capsys):
-    with pytest.raises(SystemExit):
-        cli.main(["code", "--help"])
-    shown = capsys.readouterr().out
-    assert all(name in shown for name in EQUATIONS)

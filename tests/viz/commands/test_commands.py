@@ -1,7 +1,5 @@
 """The commands that explain: lint, why and compare, as a person starts them."""
 
-from __future__ import annotations
-
 import cmath
 import re
 from pathlib import Path

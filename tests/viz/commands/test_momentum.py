@@ -1,7 +1,5 @@
 """The commands on the momentum graph: draw, lint, why, compare and inspect with --momentum."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

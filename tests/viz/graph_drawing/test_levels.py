@@ -1,7 +1,5 @@
 """Drawings by depth: rows are depths, the same for all panels, and nothing overlaps."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 

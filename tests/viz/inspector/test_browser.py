@@ -1,7 +1,5 @@
 """The page in a browser, where Playwright and a Chromium are installed."""
 
-from __future__ import annotations
-
 import re
 
 import pytest
@@ -18,7 +16,6 @@ EMBEDDED = "by_definition"
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Pages by scene."""
     folder = tmp_path_factory.mktemp("pages")
     for scene in ("triple_pendulum", "spring_mass"):
         assert cli.main(["inspect", scene, "--out", str(folder / f"{scene}.html")]) == 0
@@ -27,15 +24,12 @@ def written(tmp_path_factory):
 
 @pytest.fixture
 def show(visit, written):
-    """Open a scene's page."""
     return lambda scene="triple_pendulum", **options: visit(written / f"{scene}.html", **options)
 
 
 def graph_of(name="chain_rule"):
     return dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), name)
 
-
-# What is seen first.
 
 # Texts in the picture in CSS pixels, and items that are not whole in it.
 FIRST = """() => {
@@ -136,9 +130,6 @@ def test_detail_goes_from_nodes_to_bodies_and_back(show):
     assert page.locator(".item.box").count() > 0
 
 
-# One state.
-
-
 def test_an_input_is_edited_once_for_all_versions_and_reset(show):
     page = show("spring_mass")
     before = page.inner_text("#results table")
@@ -179,9 +170,6 @@ def test_another_record_is_shown_in_place_of_the_first(show):
     assert page.locator("#arm").get_attribute("aria-label") == "q.theta over time"  # it has no places
     assert "x1, y1" in page.locator("#frame").inner_text()
     assert not page.locator("#statetables").is_visible()
-
-
-# Asking.
 
 
 def test_two_clicks_ask_why(show):
@@ -244,9 +232,6 @@ def test_search_finds_by_name_tag_and_number(show):
     page.fill("#search", "%7")
     page.press("#search", "Enter")
     assert page.inner_text("#node p").startswith(f"%7, {operations[6].op.name}, ")
-
-
-# Stepping.
 
 
 def test_sweeps_step_forward_and_back(show):
@@ -338,9 +323,6 @@ def test_the_mechanism_follows_the_state_and_carries_its_torques(show):
     assert max(map(abs, numbers[::2])) < 1e-9  # x
     page.click("#reset")
     assert page.evaluate(sticks) == before
-
-
-# Ways to look at it.
 
 
 def test_the_theme_can_be_switched_and_dark_is_dark(show):

@@ -1,7 +1,5 @@
 """The formulas of a page in a browser: which are seen, of which model, in which color."""
 
-from __future__ import annotations
-
 import dynamics as dyn
 import viz
 

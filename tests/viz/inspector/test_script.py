@@ -1,7 +1,5 @@
 """What the page's script computes, in V8: it is what the library computes, in one state for all versions."""
 
-from __future__ import annotations
-
 import math
 import re
 from functools import cache
@@ -33,8 +31,6 @@ def pendulum() -> list[Version]:
     versions = inspection(dyn.scenes.load("triple_pendulum")).versions
     return [versions[name] for name in PAPER]
 
-
-# Where nodes are.
 
 PLACES = """(record) => {
   const versions = makeState(record).versions, plan = placesOf(record, versions);
@@ -82,9 +78,6 @@ def test_a_sum_that_is_a_result_stands_under_it(pendulum):
         used = {arg for node in each["nodes"] if isinstance(node, list) for arg in node[1:]}
         for _, _, node in each["outputs"]:
             assert (plan["cluster"][places[node]] == -2) == (node not in used)
-
-
-# Values, slopes, paths.
 
 
 def test_slopes_are_the_differences_of_every_operation():
@@ -225,8 +218,6 @@ def test_a_node_has_one_number_everywhere(pendulum):
         assert set(re.findall(r"const double v([0-9]+) = ", c)) <= {str(each) for each in found if each}
 
 
-# One state.
-
 SHARED = """(record, changes) => {
   const told = [], state = makeState(record, () => told.push(state.edited));
   const results = () => state.versions.map((version) => {
@@ -299,9 +290,6 @@ def test_a_state_and_its_tables_are_checked():
         record(versions, None, state=state, tables=[StateTable("t", graph, ["a"], {"tau0": ["a", "b"]})])
 
 
-# Noise.
-
-
 def test_what_rounding_leaves_is_told_from_what_is_small():
     """A difference of equal sums is noise, in any unit; a small number is not."""
     x, y = cg.variables("x y")
@@ -346,8 +334,6 @@ def test_a_velocity_of_a_long_arm_is_no_noise_and_what_cancels_is():
     assert all(abs(value) > sharp for value, _, sharp in outputs[:-1])
     assert abs(outputs[-1][0]) <= outputs[-1][2]
 
-
-# The mechanism in motion.
 
 SURFACES = """(radii, points, box) => {
   const svg = document.createElement("svg"), grid = surfaceView(svg, radii, points.length)(points, ...box);

@@ -1,7 +1,5 @@
 """The views of one page in a browser: tabs, the address that says what is seen, robots of many limbs, the outline."""
 
-from __future__ import annotations
-
 import re
 from itertools import groupby
 from operator import itemgetter
@@ -39,7 +37,6 @@ def arm_of_seven() -> dyn.Mechanism:
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Pages by name."""
     folder = tmp_path_factory.mktemp("pages")
     spiral = dyn.OdeSystem(lambda y, t: [y[1], -y[0] - 0.2 * y[1]], ["x", "v"])
     arm = dyn.scenes.load("triple_pendulum")
@@ -51,15 +48,11 @@ def written(tmp_path_factory):
 
 @pytest.fixture
 def show(visit, written):
-    """Open the page of a model."""
     return lambda name="arm", fragment="", **options: visit(written / f"{name}.html", fragment, **options)
 
 
 def tab(page, name):
     page.locator("#versions button", has_text=name).first.click()
-
-
-# Tabs.
 
 
 def test_every_view_is_a_tab_of_one_page_in_one_state(show):
@@ -107,9 +100,6 @@ def test_a_question_is_kept_from_view_to_view(show):
     assert slopes[0] != slopes[1] == slopes[2] == corrected
     tab(page, "Hamilton")
     assert "Choose an output" in page.inner_text("#why")  # it has no torque
-
-
-# The address.
 
 
 def test_back_goes_back_over_views_choices_and_folds(show):
@@ -165,9 +155,6 @@ def test_a_link_that_says_nothing_leaves_the_page_as_it_is(show):
         assert page.evaluate("inspector.state().q0") == q
 
 
-# Robots.
-
-
 @each_row("name", ["quadruped", "seven", "arm"])
 def test_no_result_is_cut(show, name):
     page = show(name, width=1400, height=900)
@@ -215,9 +202,6 @@ def test_what_is_unfolded_can_be_read(show):
     page.keyboard.press("u")
     page.locator(".item.box").last.click()
     assert page.evaluate("document.getElementById('scene').getCTM().a") * 13 >= 10.9
-
-
-# For who hears the page, or who is disturbed by motion.
 
 
 def test_the_outline_has_every_node_of_the_graph_as_text(show):

@@ -1,7 +1,5 @@
 """Systems for lessons: the scenes, and some to which a sentence made for an arm would not apply."""
 
-from __future__ import annotations
-
 import cgraph as cg
 import dynamics as dyn
 

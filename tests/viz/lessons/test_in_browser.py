@@ -1,7 +1,5 @@
 """The lesson in Chromium, where it and Playwright are there: keyboard, widths, dark, print, and a silent console."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest
@@ -13,7 +11,6 @@ from tests.each_row import each_row
 
 @pytest.fixture(scope="module")
 def lesson(tmp_path_factory):
-    """A page of the lesson on two links, as a file."""
     path = tmp_path_factory.mktemp("lesson") / "lesson.html"
     viz.lesson(dyn.scenes.load("two_link"), path)
     return path
@@ -21,13 +18,11 @@ def lesson(tmp_path_factory):
 
 @pytest.fixture
 def show(visit, lesson):
-    """Open the page."""
     return lambda fragment="", width=1400, **options: visit(lesson, fragment, width, 900, **options)
 
 
 @pytest.fixture(scope="module")
 def others(tmp_path_factory):
-    """Pages of the other subjects, as files."""
     folder = tmp_path_factory.mktemp("lessons")
     arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
     for subject in ("elimination", "loops", "energy", "torque"):
@@ -47,6 +42,9 @@ def test_keys_are_enough(show):
     assert fragment == "5;00000"
     again = show(f"#{fragment}")
     assert again.inner_text("nav output") == page.inner_text("nav output")
+    other = show("#4;11-9-")  # 9 is no choice
+    assert other.inner_text("nav output").endswith("of 2 right")
+    assert other.locator(".reveal[open]").count() == other.locator("nav a.right, nav a.wrong").count() == 2
     page.keyboard.press("ArrowRight")
     assert "5 questions" in page.inner_text("#end .score")
     page.click("text=Start again")

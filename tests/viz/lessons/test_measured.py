@@ -1,7 +1,5 @@
 """All systems, all questions: the marked answer is measured, and no sentence speaks of what a system has not."""
 
-from __future__ import annotations
-
 import math
 import re
 from functools import cache, partial

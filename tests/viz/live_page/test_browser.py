@@ -1,7 +1,5 @@
 """The live motion in a browser, where Playwright and a Chromium are installed."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest
@@ -126,12 +124,6 @@ def test_a_link_opens_what_was_left_and_reset_forgets_it(show):
 
 def data(page):
     return page.evaluate("JSON.parse(document.getElementById('live-data').textContent)")
-
-
-@each_row("fragment", ["#live=%", "#live=", "#live=5", "#nothing", "#live=%7B%22dt%22%3A%22x%22%7D"])
-def test_a_link_that_says_nothing_opens_the_page_as_it_is(fragment, show):
-    page = show(fragment=fragment)
-    assert page.evaluate("[...live.machine.run]") == [each["value"] for each in data(page)["inputs"]]
 
 
 def test_it_is_used_by_keys_alone(show):

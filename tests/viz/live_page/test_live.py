@@ -1,7 +1,5 @@
 """The live motion: its script in V8 computes what the library does; the page is one small strict file."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -66,9 +64,6 @@ def script(engine):
 
 def states(motion):
     return [*motion.q[-1], *motion.qd[-1]]
-
-
-# What the script computes.
 
 
 @pytest.mark.parametrize("method", ["rk4", "dopri5"])
@@ -227,9 +222,6 @@ def test_a_value_that_is_no_number_is_not_taken(script):
     ]
 
 
-# What is made of a scene.
-
-
 @each_row("name", ["spring_mass", "triple_pendulum", "chain"])
 def test_the_graphs_of_a_scene_say_what_the_library_says(name):
     scene = dyn.scenes.load(name) if name != "chain" else dyn.scenes.load(name, n=3)
@@ -281,9 +273,6 @@ def test_a_denser_body_is_the_same_body():
     found = live_of(dyn.scenes.load("chain", n=2))
     heavy = {name: 2.0 * value if name.startswith("mass.") else value for name, value in found.start.items()}
     assert list(found.rate.evaluate(heavy).values()) == pytest.approx(list(found.rate.evaluate(found.start).values()))
-
-
-# The page.
 
 
 HOSTILE = "</script><script>alert(1)</script>"

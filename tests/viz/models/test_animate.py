@@ -1,7 +1,5 @@
 """Animations: frames in real time, what is wrong in its color, and one sentence for what cannot be."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The drawing of a model: what is wrong is painted, and the file is the picture."""
 
-from __future__ import annotations
-
 import pytest
 
 import dynamics as dyn

@@ -1,7 +1,5 @@
 """The page of a model in one line of Python."""
 
-from __future__ import annotations
-
 import json
 import re
 

@@ -1,7 +1,5 @@
 """What there is to inspect in a scene, and where its joints are."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -148,11 +146,6 @@ def test_a_joint_turns_the_picture_one_way_or_the_other(axis, turns):
     assert found.turns == turns
     slide = dyn.Mechanism([dyn.Body("a", dyn.Joint("prismatic", axis=(1, 0, 0)), mass=1.0)])
     assert skeleton(slide, q).turns == (0,)
-
-
-def test_a_time_out_of_range_is_refused():
-    with pytest.raises(ValueError, match="t_end"):
-        inspection(Scene("x", "", dyn.planar_arm([1.0], [1.0]), (0.0,), (0.0,), 1.0), t_end=-1.0)
 
 
 @stops

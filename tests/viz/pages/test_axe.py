@@ -1,7 +1,5 @@
 """What axe-core says of every kind of page, where it and a Chromium are installed: nothing serious."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
 from typing import Any

@@ -1,7 +1,5 @@
 """Documents: the same content as a page and as Markdown, in files that are whole or absent."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from viz.pages.document import (

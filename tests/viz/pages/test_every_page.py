@@ -1,7 +1,5 @@
 """Every page is one file that loads nothing, whose policy lets its own script and style alone run."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import re

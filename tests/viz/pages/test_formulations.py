@@ -1,7 +1,5 @@
 """One table of counts: the figures, the lesson, lint, the inspector and the page on the paper say the same."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cgraph as cg

@@ -1,13 +1,10 @@
 """What a notebook shows of results: HTML that holds what the text holds, pictures that fit, names that stay text."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from functools import cache
 from html import escape, unescape
 from importlib import import_module
-from importlib.metadata import entry_points
 
 import numpy as np
 import pytest
@@ -106,13 +103,6 @@ def test_states_of_an_ode_are_plotted_and_what_is_left_out_is_said():
     ode = dyn.OdeSystem(lambda x, t: [-x[i] for i in range(many)], [f"x{i}" for i in range(many)])
     run = dyn.simulate(ode, np.ones(many), None, t_end=0.1)
     assert f"the first {COLUMNS} of {many}" in trajectory_html(run)
-
-
-def test_the_package_tells_notebooks_what_draws():
-    installed = {entry.name: entry.value for entry in entry_points(group="cgraph.renderers")}
-    assert installed["graph"] == "viz.pages.notebook:graph_html"
-    assert installed["node"] == "viz.pages.notebook:node_html"
-    assert installed["trajectory"] == "viz.pages.notebook:trajectory_html"
 
 
 def test_every_renderer_that_the_package_names_is_there():

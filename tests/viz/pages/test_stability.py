@@ -27,12 +27,7 @@ def row(case: str, verdict: str, *figures: dict[str, Any], reason: str = "", sto
 
 ROWS = [
     row("Robertson", "meets", figure(1e-9, True), figure(0.5, True, "inf")),
-    row(
-        "a name that is longer than there is room for",
-        "limit",
-        figure(7.0, False),
-        reason="A known <reason>.",
-    ),
+    row("a name that is longer than there is room for", "limit", figure(7.0, False), reason="A known <reason>."),
     row("another", "limit", figure(8.0, False), reason="A known <reason>."),
     row("broken", "unexplained", figure("nan", False), stopped="stopped at t = 1 s"),
 ]
@@ -51,7 +46,6 @@ CONTENT = {
 
 @pytest.fixture(scope="module")
 def document() -> Document:
-    """The document, drawn once."""
     return stability_page.document(CONTENT)
 
 
@@ -126,9 +120,3 @@ def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
     printed = capsys.readouterr()
     assert json.loads(printed.out)["sections"][0]["rows"][1]["verdict"] == "unexplained"
     assert "beyond its bound without a known reason: Kapitza's pendulum by euler" in printed.err
-
-
-@pytest.mark.slow
-def test_a_quick_report_succeeds(tmp_path: Path) -> None:
-    assert cli.main(["report", "--stability", "--quick", "--out", str(tmp_path)]) == 0
-    assert (tmp_path / "stability.html").stat().st_size > 100_000

@@ -1,7 +1,5 @@
 """Reports of integrators as pages: what was measured is shown, and a mistake costs a line."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable
@@ -58,9 +56,7 @@ def content(**others: Any) -> dict[str, Any]:
         "curves": curves,
         "absent": {"euler": "too slow"},
         "left_out": ["contacts"],
-        "targets": [
-            {"error": 1e-6, "name": "dop853", "knob": 1e-6, "seconds": 4e-4},
-        ],
+        "targets": [{"error": 1e-6, "name": "dop853", "knob": 1e-6, "seconds": 4e-4}],
     } | others
 
 

@@ -1,7 +1,5 @@
 """The figure that moves, in Chromium, where it and Playwright are there: views, steps, keys, and a silent console."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

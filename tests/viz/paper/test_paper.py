@@ -1,7 +1,5 @@
 """The paper's figures: one run of the whole command, and what its files say."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

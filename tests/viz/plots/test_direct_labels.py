@@ -1,7 +1,5 @@
 """Log-log plots: names at the ends of curves lie apart, and axes have their powers of ten."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Plots as SVG: the ink of a picture follows the page."""
 
-from __future__ import annotations
-
 from xml.etree import ElementTree
 
 import numpy as np

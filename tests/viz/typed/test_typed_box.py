@@ -1,7 +1,5 @@
 """The box at work, in V8: what is typed reaches the inspector, what is wrong is said below, links hold the text."""
 
-from __future__ import annotations
-
 import json
 
 from py_mini_racer import MiniRacer

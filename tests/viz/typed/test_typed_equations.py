@@ -1,7 +1,5 @@
 """Equations of typed Lagrangians are those of the library: torques, accelerations, counts of nodes, lint in words."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable

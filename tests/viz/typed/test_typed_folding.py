@@ -1,7 +1,5 @@
 """Folding in the page is the library's, rule for rule: the same nodes, in the same order, of the same arguments."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Motions of typed systems: those of the library, as exact as they say, and ended in a word where they cannot go on."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The page with its box: small, closed to the net, and able to show what Python has."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

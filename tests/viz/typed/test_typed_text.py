@@ -1,7 +1,5 @@
 """What people type: one meaning in every notation, and one sentence with its place for what has none."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

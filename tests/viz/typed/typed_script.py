@@ -1,7 +1,5 @@
 """The engine of the typed page in V8, without a browser."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from typing import Any
@@ -44,7 +42,6 @@ function outputsAt(graph, at) {
 
 @cache
 def machine() -> MiniRacer:
-    """V8 with the engine."""
     engine = MiniRacer()
     engine.eval(f"{script()}\n{HELPERS}")
     return engine

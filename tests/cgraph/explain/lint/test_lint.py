@@ -33,9 +33,6 @@ def state(n: int) -> tuple[str, str]:
     return " ".join(f"q{i}" for i in range(n)), " ".join(f"qd{i}" for i in range(n))
 
 
-# Independence.
-
-
 @each_row(("n", "simplify"), [(1, True), (2, False), (4, True), (9, True), (9, False)])
 def test_by_definition_the_blame_is_one_edge_for_each_joint_and_by_the_chain_rule_there_is_a_proof(n, simplify):
     for formulation in ("chain_rule", "chain_rule_literal"):
@@ -132,16 +129,6 @@ def test_of_cuts_of_one_size_the_one_nearest_to_the_dependent_is_blamed():
     assert finding.data["paths"] == ["x -> sin(x) -> cos(sin(x)) -> exp(cos(sin(x)))"]
 
 
-def test_two_uses_are_two_edges():
-    a = cg.with_name(cg.sin(x) * cg.sin(x) + y, "a")
-    assert len(lint(cg.Graph([x, y], {"f": a}), independent=("a", "x")).edges) == 1  # one behind the product
-    a = cg.with_name(x * x, "a")
-    assert len(lint(cg.Graph([x], {"f": a}), independent=("a", "x")).edges) == 2
-    once = cg.sin(x)
-    (finding,) = lint(cg.Graph([x], {"f": once * once}), independent=("f", "x")).findings
-    assert [each["text"] for each in finding.data["cut"]] == ["x -> sin(x)"]
-
-
 def test_groups_may_be_given_in_many_ways():
     graph = cg.Graph([x, y, z], {"f": cg.with_name(x * y, "two words") + z})
     for pairs in (("x y", "z"), [("x, y", "z")], [(["x", "y"], "z")], [((x, "y"), z)], [("x", "z"), ("y", "z")]):
@@ -198,9 +185,6 @@ def test_a_report_is_json():
     assert graph.nodes[edge[0]] in graph.nodes[edge[1]].args
 
 
-# Dependence.
-
-
 def test_missing_dependence_and_unused_inputs_are_named():
     graph = cg.Graph([x, y, z], {"f": x + 1.0, "g": x * y})
     found = lint(graph, depends={"f": "x y", "g": ["x", y]})
@@ -210,9 +194,6 @@ def test_missing_dependence_and_unused_inputs_are_named():
     assert lint(graph, depends={"g": "x y"}).ok
     with pytest.raises(cg.GraphError, match="'h'"):
         lint(graph, depends={"h": "x"})
-
-
-# A box.
 
 
 @st.composite
@@ -324,9 +305,6 @@ def test_a_finding_in_a_box_tells_the_arguments_and_the_tags():
     assert (
         str(lint(graph, box={"x": (1.0, 2.0), "y": 0.5})) == "Holds: no slope is unbounded in the box, of 2 operations."
     )
-
-
-# A point.
 
 
 @settings(max_examples=examples(100))
