@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from ..outcome import REACHED
 from ..trajectory import Crossings
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
@@ -182,46 +180,6 @@ class Ensemble:
         whole = int(np.count_nonzero(self.stats.success))
         return f"<Ensemble of {many}, {what}: {rows} rows{span}; {self.stats.method}, {whole} reached t_end>"
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """A row for each trajectory and time (extra `tables`).
-
-        Its index is (trajectory, t); its columns are coordinates "q.<name>" and velocities "qd.<name>", momenta
-        "p.<name>", then parameters, then `success` and `message`. Starts, events and other statistics are not in it. A
-        file is pandas' own, as in `.to_parquet("fall.parquet")`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            N times T rows, in memory.
-
-        Raises
-        ------
-        ImportError
-            Where pandas is not installed.
-
-        Examples
-        --------
-        >>> import dynamics as dyn
-        >>> spring = dyn.System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2, "x", {"k": 1.0})
-        >>> sweep = dyn.simulate_many(spring, [1.0], [0.0], 1.0, parameters={"k": [1.0, 4.0]}, t_eval=[0.0, 1.0])
-        >>> table = sweep.to_pandas()
-        >>> table["q.x"].loc[1, 1.0].round(3), table["k"].loc[1, 1.0]
-        (np.float64(-0.416), np.float64(4.0))
-        """
-        module, (many, rows, _) = _module("pandas"), self.q.shape
-        blocks = {"q": (self.coordinates, self.q), "qd": (self.velocities, self.qd)}
-        blocks |= {} if self.p is None else {"p": (self.velocities, self.p)}
-        columns = {
-            f"{letter}.{name}": values[:, :, k].reshape(-1)
-            for letter, (names, values) in blocks.items()
-            for k, name in enumerate(names)
-        }
-        message = np.array(self.stats.message, object)
-        own = {**self.parameters, "success": self.stats.success, "message": message}
-        columns |= {name: np.repeat(values, rows) for name, values in own.items()}
-        index = module.MultiIndex.from_product([np.arange(many), self.t], names=["trajectory", "t"])
-        return module.DataFrame(columns, index)
-
     def to_xarray(self) -> xarray.Dataset:
         """Arrays with names (extra `tables`): all but `events`, whose number differs from trajectory to trajectory.
 
@@ -244,8 +202,11 @@ class Ensemble:
         >>> fan.to_xarray().q.sel(coordinate="joint 1", t=1.0).values.round(4)
         array([-0.077, -0.155])
         """
-        module, stats = _module("xarray"), self.stats
-        by_time, of_start = ("trajectory", "t"), ("trajectory",)
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError(f"this table needs xarray: {install('tables')}") from None
+        stats, by_time, of_start = self.stats, ("trajectory", "t"), ("trajectory",)
         columns = {"q": ("coordinate", self.q, self.q_start), "qd": ("velocity", self.qd, self.qd_start)}
         variables: dict[str, Any] = {}
         for name, (dimension, rows, start) in columns.items():
@@ -266,12 +227,4 @@ class Ensemble:
             "velocity": list(self.velocities),
             **{name: (of_start, values) for name, values in self.parameters.items()},
         }
-        return module.Dataset(variables, coordinates, {"method": stats.method})
-
-
-def _module(name: str) -> Any:
-    """The package. Raises ImportError that names the extra."""
-    try:
-        return import_module(name)
-    except ImportError:
-        raise ImportError(f"this table needs {name}: {install('tables')}") from None
+        return xarray.Dataset(variables, coordinates, {"method": stats.method})

@@ -237,7 +237,8 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
     except KeyboardInterrupt:
         if store is None:
             raise
-        raise KeyboardInterrupt(store.kept(sum(came.values()))) from None
+        keeps = f"{store.name} keeps {sum(came.values())} of {len(x)} trajectories"
+        raise KeyboardInterrupt(f"{keeps}: the same call goes on") from None
     if (done := sum(came.values())) != len(x):
         back = f"of {len(x)} trajectories came back {done}"
         raise ValueError(f"workers must give a result for each item, as map does: {back}")

@@ -12,7 +12,6 @@ from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile
 from zlib import crc32
 
 import numpy as np
@@ -28,55 +27,48 @@ if TYPE_CHECKING:
     import sqlite3
 
 SWEEP, ROWS, LOCK = "sweep.json", "rows.npy", "lock.sqlite"
-FORMAT = 1
-NUMBERS = [name for name, kind in COLUMNS.items() if kind is not np.object_]
-AGAIN = "remove the folder, and the sweep begins anew"
+FORMAT = 2
+GIB = 2**30
 
 
 class Store:
     """The folder of a sweep.
 
     sweep.json: what the sweep is, see `sweep_of`, and how many trajectories are in a chunk.  rows.npy: the states
-    (N, T, m) of all, in place.  chunk-000000000.npz, ..: how the trajectories from that number on went and the checksum
-    of their rows, a file each, which is there once their rows are.  lock.sqlite: what one call at a time holds, see
-    `lock`; it has nothing in it.
+    (N, T, m) of all, in place.  chunk-000000000.json, ..: how the trajectories from that number on went and the
+    checksum of their rows, a file each, which is there once their rows are.  lock.sqlite: what one call at a time
+    holds, see `lock`; it has nothing in it.
 
-    width: trajectories in a chunk, as the sweep began.  rows: the table, written through to the file.
+    name: of the store, in sentences.  width: trajectories in a chunk, as the sweep began.  rows: the table, written
+    through to the file.
     """
 
     def __init__(self, folder: Path, sweep: dict[str, Json], width: int, shape: tuple[int, ...]) -> None:
         """Open the folder, or begin it. Raises ValueError where it keeps something else, OSError where it cannot be."""
-        self._folder, self._name, self.width = folder, f"store {str(folder)!r}", width
+        self._folder, self.name, self.width = folder, f"store {str(folder)!r}", width
         self._lock: sqlite3.Connection | None = None
         folder.mkdir(parents=True, exist_ok=True)
         try:
-            self._open(sweep, shape)
-        except BaseException:
-            self.close()
-            raise
-
-    def _open(self, sweep: dict[str, Json], shape: tuple[int, ...]) -> None:
-        folder, known = self._folder, self._read()
-        left_over = list(folder.glob(".*.tmp"))  # of files that a process was writing when it was ended
-        chunks = [self._file(first) for first in range(0, shape[0], known["chunk"])] if known else []
-        if left_over or not chunks or not all(path.exists() for path in chunks):  # else the folder is read alone
-            self.lock()
-            for path in left_over:
-                path.unlink(missing_ok=True)
-            known = self._read()
-        if known:
+            known = self._known()
+            left_over = list(folder.glob(".*.tmp"))  # of files that a process was writing when it was ended
+            if left_over or not known or not all(self._file(k).exists() for k in range(0, shape[0], known["chunk"])):
+                self.lock()  # else the folder is read alone
+                for path in left_over:
+                    path.unlink(missing_ok=True)
+                known = self._known()
+            if not known:
+                if any(path.name != LOCK for path in folder.iterdir()):
+                    raise ValueError(f"{self.name} is a folder with other files and without a sweep: name an empty one")
+                known = {**sweep, "chunk": width}
+                atomic_write(folder / SWEEP, json.dumps(known, indent=1))
             for name, value in sweep.items():
                 if known.get(name) != value:
                     there = f"there {name} is {known.get(name)!r:.60}, here {value!r:.60}"
-                    raise ValueError(f"{self._name} keeps another sweep: {there}")
-            self.width = known["chunk"]
-        elif any(path.name != LOCK for path in folder.iterdir()):
-            raise ValueError(f"{self._name} is a folder with other files and without a sweep: name an empty one")
-        else:
-            atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": self.width}, indent=1))
-        if not (folder / ROWS).exists():
-            self._make_rows(shape)
-        self.rows = self._table(shape)
+                    raise ValueError(f"{self.name} keeps another sweep: {there}")
+            self.width, self.rows = known["chunk"], self._table(shape)
+        except BaseException:
+            self.close()
+            raise
 
     def lock(self) -> None:
         """Take the folder for this call alone, until `close` or the end of the process, however that ends.
@@ -87,17 +79,16 @@ class Store:
 
         if self._lock is not None:
             return
-        lock = sqlite3.connect(self._folder / LOCK, timeout=0.0, check_same_thread=False)
+        self._lock = sqlite3.connect(self._folder / LOCK, timeout=0.0, check_same_thread=False)
         try:
-            lock.execute("PRAGMA journal_mode = MEMORY")  # no file beside
-            lock.execute("BEGIN EXCLUSIVE")
+            self._lock.execute("PRAGMA journal_mode = MEMORY")  # no file beside
+            self._lock.execute("BEGIN EXCLUSIVE")
         except sqlite3.OperationalError as error:
-            lock.close()
+            self.close()
             if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
-                raise OSError(f"{self._name} cannot be locked: {error}") from None
+                raise OSError(f"{self.name} cannot be locked: {error}") from None
             other = "another call of simulate_many, here or in another process"
-            raise OSError(f"{self._name} is being written by {other}: wait for it, or name another folder") from None
-        self._lock = lock
+            raise OSError(f"{self.name} is being written by {other}: wait for it, or name another folder") from None
 
     def close(self) -> None:
         """Leave the folder to others."""
@@ -105,37 +96,25 @@ class Store:
             self._lock.close()
             self._lock = None
 
-    def kept(self, done: int) -> str:
-        """Sentence on what the folder has of a sweep that was interrupted."""
-        return f"{self._name} keeps {done} of {len(self.rows)} trajectories: the same call goes on"
-
     def part(self, chunk: Chunk) -> Part | None:
         """The results of a chunk, if they are there."""
         part = Part(chunk.first, self.rows[chunk.first : chunk.first + len(chunk.x)])
         try:
-            with np.load(self._file(chunk.first), allow_pickle=False) as kept:
-                part.put(slice(None), **{name: kept[name] for name in NUMBERS})
-                texts, checksum = json.loads(kept["texts"].tobytes()), int(kept["checksum"])
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # not there, or damaged: the chunk is run again
+            kept = json.loads(self._file(chunk.first).read_text(encoding="utf-8"))
+            part.put(slice(None), **{name: kept[name] for name in COLUMNS.keys() - {"warnings"}})
+            for k, (said, log) in enumerate(zip(kept["warnings"], kept["happened"], strict=True)):
+                part.put(k, warnings=tuple(said), happened=[(number, t, np.array(x)) for number, t, x in log])
+            return part if crc32(part.rows.data) == kept["checksum"] else None
+        except (OSError, ValueError, KeyError, TypeError):  # not there, or damaged: the chunk is run again
             return None
-        part.put(slice(None), message=texts["messages"])
-        for k, said in enumerate(texts["warnings"]):
-            part.put(k, warnings=tuple(said))
-        for k, log in enumerate(texts["happened"]):
-            part.put(k, happened=[(number, t, np.array(x)) for number, t, x in log])
-        return part if crc32(part.rows.data) == checksum else None
 
     def keep(self, part: Part) -> None:
         """Write how the trajectories of a part went; their rows are in the table."""
         self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
-        columns, written = part.columns, BytesIO()
-        happened = [[(number, t, x.tolist()) for number, t, x in log] for log in columns["happened"]]
-        texts = {"messages": columns["message"].tolist(), "warnings": columns["warnings"].tolist()}
-        words = json.dumps({**texts, "happened": happened if any(happened) else []}).encode()
+        kept = {name: values.tolist() for name, values in part.columns.items()}
+        kept["happened"] = [[(number, t, x.tolist()) for number, t, x in log] for log in kept["happened"]]
         checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
-        kept: dict[str, Any] = {"texts": np.frombuffer(words, np.uint8), "checksum": np.array(checksum, np.uint32)}
-        np.savez(written, **kept, **{name: columns[name] for name in NUMBERS})
-        atomic_write(self._file(part.first), written.getvalue())
+        atomic_write(self._file(part.first), json.dumps({**kept, "checksum": checksum}))
 
     def read_only(self) -> Array:
         """The table, of which rows are read when they are asked for, and none can be written."""
@@ -143,9 +122,9 @@ class Store:
         return table
 
     def _file(self, first: int) -> Path:
-        return self._folder / f"chunk-{first:09d}.npz"
+        return self._folder / f"chunk-{first:09d}.json"
 
-    def _read(self) -> dict[str, Any]:
+    def _known(self) -> dict[str, Any]:
         """What the folder keeps; empty if nothing."""
         try:
             known = json.loads((self._folder / SWEEP).read_text(encoding="utf-8"))
@@ -154,44 +133,44 @@ class Store:
         except ValueError:
             known = None
         if not isinstance(known, dict) or not isinstance(known.get("chunk"), int):
-            raise ValueError(f"{self._name} is damaged: its {SWEEP} is not one that was written here")
+            raise ValueError(f"{self.name} is damaged: its {SWEEP} is not one that was written here")
         return known
 
     def _table(self, shape: tuple[int, ...]) -> Array:
         """The table, in its file. Raises ValueError for a file that was cut: a memory map would fill it with zeros."""
-        path, header, damaged = self._folder / ROWS, BytesIO(), f"{self._name} is damaged: its {ROWS}"
+        path, header, damaged = self._folder / ROWS, BytesIO(), f"{self.name} is damaged: "
         described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(header, described)
-        size, expected = path.stat().st_size, header.tell() + 8 * math.prod(shape)
-        if size != expected:
-            raise ValueError(f"{damaged} has {size} bytes, not {expected}; {AGAIN}")
-        try:
-            table: Array = np.load(path, mmap_mode="r+")
-        except ValueError:
-            raise ValueError(f"{damaged} is no table of NumPy; {AGAIN}") from None
-        if table.shape != shape:
-            raise ValueError(f"{damaged} has shape {table.shape}, not {shape}; {AGAIN}")
+        expected = header.tell() + 8 * math.prod(shape)
+        if not path.exists():
+            if any(self._folder.glob("chunk-*")):
+                raise ValueError(f"{damaged}it has results of chunks, and no {ROWS}")
+            self._make_rows(header.getvalue(), expected, shape)
+        again = "remove the folder, and the sweep begins anew"
+        if (size := path.stat().st_size) != expected:
+            raise ValueError(f"{damaged}its {ROWS} has {size} bytes, not {expected}; {again}")
+        with path.open("rb") as file:
+            if file.read(header.tell()) != header.getvalue():
+                raise ValueError(f"{damaged}its {ROWS} is no table of NumPy of shape {shape}; {again}")
+        table: Array = np.load(path, mmap_mode="r+")
         return table
 
-    def _make_rows(self, shape: tuple[int, ...]) -> None:
-        if any(self._folder.glob("chunk-*.npz")):
-            raise ValueError(f"{self._name} is damaged: it has results of chunks, and no {ROWS}")
-        size, free = 8 * math.prod(shape), shutil.disk_usage(self._folder).free
+    def _make_rows(self, header: bytes, size: int, shape: tuple[int, ...]) -> None:
+        """Make the file of the table, with all its room."""
+        what, free = f"{self.name} needs {size / GIB:.3g} GiB for", shutil.disk_usage(self._folder).free
         if size > free:  # a write through a memory map would end the process
-            needed = f"{shape[0]} trajectories of {shape[1]} rows of {shape[2]} numbers, and {free / 2**30:.3g} GiB"
-            raise OSError(
-                f"{self._name} needs {size / 2**30:.3g} GiB for {needed} are free: record fewer times (t_eval)"
-            )
+            needed = f"{shape[0]} trajectories of {shape[1]} rows of {shape[2]} numbers"
+            raise OSError(f"{what} {needed}, and {free / GIB:.3g} GiB are free: record fewer times (t_eval)")
         made = self._folder / f".{ROWS}.{os.getpid()}.tmp"
         try:
-            np.lib.format.open_memmap(made, "w+", np.float64, shape=shape)
-            if hasattr(os, "posix_fallocate"):  # now, as nobody else may then take the room
-                with made.open("r+b") as file:
-                    os.posix_fallocate(file.fileno(), 0, made.stat().st_size)
+            with made.open("wb") as file:
+                file.write(header)
+                file.truncate(size)
+                if hasattr(os, "posix_fallocate"):  # now, as nobody else may then take the room
+                    os.posix_fallocate(file.fileno(), 0, size)
         except OSError as error:
             made.unlink(missing_ok=True)
-            needs = f"needs a {ROWS} of {size / 2**30:.3g} GiB, which cannot be made"
-            raise OSError(error.errno, f"{self._name} {needs}: {error.strerror}") from None
+            raise OSError(error.errno, f"{what} a {ROWS}, which cannot be made: {error.strerror}") from None
         made.replace(self._folder / ROWS)
 
 
@@ -203,10 +182,14 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
     program, options, watched = task.program, task.options, task.events.events if task.events else ()
     model = [problem.rate, problem.velocities, program.normalization]
     events = [graph for event in watched for graph in (event.values, event.reset)]
-    given = {
+    try:
+        llvmlite = version("llvmlite")
+    except PackageNotFoundError:
+        llvmlite = ""
+    known = {
         "format": FORMAT,
         "cgraph": cg.__version__,
-        "llvmlite": _version("llvmlite"),
+        "llvmlite": llvmlite,
         "machine": platform.machine(),
         **{name: getattr(options, name) for name in ("method", "backend", "fma", "estimate_error")},
         **{name: getattr(options, name) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
@@ -223,16 +206,9 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "starts": _digest(x.tobytes()),
         "parameters": _digest(p.tobytes()),
     }
-    sweep: dict[str, Json] = json.loads(json.dumps(given, default=float))
+    sweep: dict[str, Json] = json.loads(json.dumps(known, default=float))
     return sweep
 
 
 def _digest(*parts: bytes) -> str:
     return blake2b(b"".join(parts), digest_size=16).hexdigest()
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""

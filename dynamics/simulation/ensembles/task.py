@@ -12,7 +12,7 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..estimates.error_estimate import ASIDE, Comparison, RunsBeside, error_estimates, runs_beside
+from ..estimates.error_estimate import ASIDE, RunsBeside, error_estimates, runs_beside
 from ..estimates.unresolved import Watch
 from ..events.event import EventProgram
 from ..outcome import INTERRUPTED, outcome
@@ -21,20 +21,9 @@ from ..stepper import ChosenStepper, Stepper, stepper
 from ..steps.equal_steps import EqualSteps, Numbers, even_steps
 from ..steps.step_program import StepProgram, compile_steps
 from .ensemble import COLUMNS, Part
-from .lanes import (
-    VECTOR,
-    Code,
-    LaneRuns,
-    Leg,
-    Stopped,
-    chosen_in_lanes,
-    equal_in_lanes,
-    fits_lanes,
-    lanes_of,
-    legs_of,
-)
+from .lanes import VECTOR, LaneRun, LaneRuns, Leg, Stopped, chosen_legs, equal_legs, fits_lanes, lanes_of
 
-LARGEST_CHUNK = 256  # trajectories in a chunk one by one, unless asked for
+LARGEST_CHUNK = 256  # trajectories in a chunk one by one or of a store, unless asked for
 LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
 ROWS = 2**22  # .. so many numbers
 SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
@@ -73,16 +62,16 @@ class Task:
             self.largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // (program.steps.width * rows)))
 
     def width(self, chunk: int | None, workers: object, *, stored: bool = False) -> int:
-        """Trajectories in a chunk: in lanes, of whole vectors.
+        """Trajectories in a chunk: as asked for, or the shares of workers; in lanes whole vectors.
 
-        chunk: as asked for.  stored: whether a chunk that has not ended is lost when the process is, so that it should
-        be small.
+        stored: whether a chunk that has not ended is lost when the process is, so that it should be small.
         """
-        largest, equal = self.largest or chunk or LARGEST_CHUNK, self.largest and self._grids
-        shares = 1 if equal and self._many * self._grids[0].steps <= SHORT else SHARES
-        shares *= workers if isinstance(workers, int) else UNKNOWN
-        width = min(chunk or min(math.ceil(self._many / shares), LARGEST_CHUNK if stored else largest), largest)
-        return math.ceil(width / VECTOR) * VECTOR if equal else width
+        if chunk is None:
+            shares = 1 if self._grids and self._many * self._grids[0].steps <= SHORT else SHARES
+            shares *= workers if isinstance(workers, int) else UNKNOWN
+            most = LARGEST_CHUNK if stored or not self.largest else self.largest
+            chunk = min(math.ceil(self._many / shares), most)
+        return math.ceil(min(chunk, self.largest) / VECTOR) * VECTOR if self.largest else chunk
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
@@ -108,27 +97,25 @@ class Task:
 
         rows: (k, T, m), receives their rows.
         """
-        lanes = self._lanes
+        if not self.largest:
+            return None
+        program, options, beside = self.program, self.options, self._beside
+        with _lock:
+            lanes = lanes_of(program, options.backend, options.fma)
         if lanes is None:
             return None
-        if self.program.adaptive:
-            return chosen_in_lanes(lanes, self.program, self.options, x, p, rows, stopped)
-        (own, *others), beside = self._legs, self._beside
+        (own, *others), run = self._legs, LaneRun(lanes, program, options, x, p)
         if beside is None:
-            return equal_in_lanes(lanes, x, p, own, [rows], stopped)
-        watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
+            return run.to_end(own, [rows], stopped)
+        watch = Watch(program.rate, p, options.t0, x)
         if watch.needed:  # which sees all steps, so many at once
-            every = max(1, ROWS // (len(x) * self.program.steps.width))
-            own = legs_of(self._grids, self._tables, every)
+            own = equal_legs(self._grids, self._tables, max(1, ROWS // (len(x) * program.steps.width)))
         states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
-        whole, columns = equal_in_lanes(
-            lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None
-        )
+        whole, columns = run.to_end(own, [rows, states[0]], stopped, watch.add)
         for legs, each in zip(others, states[1:], strict=True):
-            equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
+            LaneRun(lanes, program, options, x * ASIDE, p).to_end(legs, [each], stopped)
         steps = int(columns["steps"][0])
-        errors = error_estimates(self.program, self.options, beside.law, watch, steps, Comparison(beside.t, [*states]))
-        return whole, columns | errors
+        return whole, columns | error_estimates(program, options, beside.law, watch, steps, beside.t, [*states])
 
     @cached_property
     def _tables(self) -> list[Numbers]:
@@ -142,17 +129,11 @@ class Task:
     @cached_property
     def _legs(self) -> list[Iterable[Leg]]:
         """Legs of the runs, and of those beside."""
-        beside = () if self._beside is None else self._beside.runs
-        others = [list(legs_of(stretches, [numbers])) for stretches, numbers in beside]
-        return [list(legs_of(self._grids, self._tables)), *others]
-
-    @property
-    def _lanes(self) -> Code | None:
-        """The code of lanes, if trajectories go there."""
-        if not self.largest:
-            return None
-        with _lock:
-            return lanes_of(self.program, self.options.backend, self.options.fma)
+        if self.program.adaptive:
+            return [chosen_legs(self.options)]
+        beside = [] if self._beside is None else self._beside.runs
+        runs = [(self._grids, self._tables), *[(stretches, [numbers]) for stretches, numbers in beside]]
+        return [list(equal_legs(stretches, tables)) for stretches, tables in runs]
 
     def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Stopped) -> None:
         """Run these, each alone."""

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ThreadPoolExecutor, wait
-from contextlib import suppress
-from multiprocessing.pool import Pool
-from multiprocessing.process import BaseProcess
 
 import numpy as np
 
@@ -66,7 +62,10 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -
         return
     done, wanted = 0, "workers must give the results of the function, as map does, got"
     try:
-        results = _elsewhere(task, chunks, workers)
+        executor = workers if isinstance(workers, Executor) else getattr(workers, "__self__", None)
+        results: object = (
+            _by_executor(executor, task, chunks) if isinstance(executor, Executor) else workers(task, chunks)
+        )
         if not isinstance(results, Iterable):
             raise TypeError(f"{wanted} {results!r:.60}")
         for part in results:
@@ -80,17 +79,6 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -
         raise RuntimeError(ended) from None
 
 
-def _elsewhere(task: Task, chunks: Sequence[Chunk], workers: Map | Executor) -> object:
-    """What others make: an executor or a pool, also by their maps, as chunks end; or another map."""
-    pool = workers if isinstance(workers, Executor) else getattr(workers, "__self__", None)
-    if isinstance(pool, Executor):
-        return _by_executor(pool, task, chunks)
-    if isinstance(pool, Pool):
-        return _by_pool(pool, task, chunks)
-    assert not isinstance(workers, Executor)
-    return workers(task, chunks)
-
-
 def _by_executor(pool: Executor, run: Callable[[Chunk], Part], chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
     """The parts as they end, none of which is kept: an executor's own map waits for the first, and holds the others."""
     waiting = {pool.submit(run, chunk) for chunk in chunks}
@@ -102,16 +90,3 @@ def _by_executor(pool: Executor, run: Callable[[Chunk], Part], chunks: Sequence[
     finally:
         for each in waiting:
             each.cancel()
-
-
-def _by_pool(pool: Pool, task: Task, chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
-    """The parts from a `multiprocessing` pool, whose own map waits for ever for what a killed process had in hand."""
-    parts, watched = pool.imap_unordered(task, chunks), set[BaseProcess]()
-    for _ in chunks:
-        while True:
-            watched |= {each for each in multiprocessing.active_children() if "PoolWorker" in each.name}
-            with suppress(multiprocessing.TimeoutError):
-                yield parts.next(timeout=LOOK)
-                break
-            if any([each.exitcode not in (None, 0) for each in watched]):
-                raise BrokenExecutor

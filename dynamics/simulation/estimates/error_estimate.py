@@ -2,8 +2,8 @@
 
 With an error that is e = C h^p along the run, x(2h) - x(h) = (2^p - 1) e, and x(4h) - x(2h) is 2^p times as large; how
 much larger it is tells the order that the run has. Of steps that are not all equal, 2^p is the ratio of the sums of
-h^(p + 1). Across a jump or a kink of the rate these runs may be off alike, and what a step can miss there is the least
-that is said. This is the error of the state, phase included, not that of the energy.
+h^(p + 1). Across a jump or a kink of the rate all may be off alike, and the error is unknown. This is the error of the
+state, phase included, not that of the energy.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -57,11 +57,6 @@ class Law(NamedTuple):
     ratio: float = 1.0
 
 
-def law_of_halves(longest: float, order: int) -> Law:
-    """The law if the run beside has steps of half the length."""
-    return Law(longest, 1.0 / (1.0 - 0.5**order))
-
-
 class RunsBeside(NamedTuple):
     """Runs beside one of equal steps, which is looked at after so many of its steps, at instants t, (T,) each.
 
@@ -88,124 +83,83 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
         return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
     half = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
     numbers = sampled_numbers(steps, 1, LOOKS)
-    return RunsBeside(law_of_halves(longest, order), [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
-
-
-class Comparison(NamedTuple):
-    """States of k runs, and of those beside them, at instants t (T,).
-
-    rows: (k, T, m) each, not finite where a run has stopped.  alike: of each and the next, which rows can be compared;
-    all by default.  lost: when one takes another course.
-    """
-
-    t: Array
-    rows: Sequence[Array]
-    alike: Sequence[Flags] = ()
-    lost: float = math.nan
+    law = Law(longest, 1.0 / (1.0 - 0.5**order))
+    return RunsBeside(law, [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
 
 
 def error_estimates(
-    program: StepProgram, options: RunOptions, law: Law, watch: Watch, steps: int, compared: Comparison
+    program: StepProgram,
+    options: RunOptions,
+    law: Law,
+    watch: Watch,
+    steps: int,
+    t: Array,
+    rows: Sequence[Array],
+    alike: Sequence[Flags] = (),
+    lost: float = math.nan,
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
     The errors are relative to the sizes of components, NaN if nothing was compared, and infinite if unknown.
+    rows: states of the runs, and of those beside, (k, T, m) each, at t (T,); not finite where a run has stopped.
+    alike: which rows of each and the next can be compared; all by default.  lost: when one takes another course.
     """
-    t, rows, alike, lost = compared
-    many, warnings = len(rows[0]), np.zeros(len(rows[0]), dtype=np.object_)
+    many, warnings = len(rows[0]), np.empty(len(rows[0]), dtype=np.object_)
     warnings.fill(())
     if len(rows) == 1:
         return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
     watch.look()
-    between = [other - one for one, other in itertools.pairwise(rows)]
-    for k, each in enumerate(between):
+    apart = [other - one for one, other in itertools.pairwise(rows)]
+    for k, each in enumerate(apart):
         np.abs(each, out=each)
         if alike:
             each[:, ~alike[k]] = 0.0
     at_end = int(np.flatnonzero(alike[0])[-1]) if alike else -1
     scale = program.kinds.scale(np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)))
-    peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in between]]
+    peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in apart]]
     since = np.full(many, lost)
     for k in np.flatnonzero(np.isinf(peaks[0]).any(axis=1)).tolist():
-        since[k] = t[np.argmin(np.isfinite(between[0][k]).all(axis=1))]
+        since[k] = t[np.argmin(np.isfinite(apart[0][k]).all(axis=1))]
     with np.errstate(all="ignore"):
         measured = peaks[-1] / peaks[0]
-        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], between[0][:, at_end], watch.missed)]
-    least = np.maximum(shares[2], UNIT * math.sqrt(steps))
-    largest, last = [np.maximum(least, _errors(each, measured, law, watch.bent)) for each in shares[:2]]
+        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], apart[0][:, at_end])]
+    largest, last = [np.maximum(UNIT * math.sqrt(steps), _errors(each, measured, law)) for each in shares]
     largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
     resolved = math.pi * max(1.0, 0.5 * program.order) / law.longest  # rad/s: two evaluations in a turn
-    for unseen in (watch.turning > resolved, ~np.isnan(since)):
-        largest[unseen] = last[unseen] = math.inf
+    unknown = (watch.turning > resolved) | ~np.isnan(since) | ~np.isnan(watch.bent)
+    largest[unknown] = last[unknown] = math.inf
     allowed = options.absolute + options.relative * scale
     for k in np.flatnonzero(~(largest * scale <= allowed).all(axis=1)).tolist():
+        how = f"a dt shorter than {options.step:g} s, or method='dop853', which chooses its steps"
+        how = f"; rtol = {options.relative:g} allows less: take {how}"
         if watch.turning[k] > resolved:
             said = (
                 f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
                 f"{law.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
             )
+        elif not math.isnan(watch.bent[k]):
+            said = f"{UNKNOWN} from t = {watch.bent[k]:.6g} s on: the rate has a jump or a kink there"
+            how = ": take method='dop853', which finds its way across"
         elif not math.isnan(since[k]):
             at = f"t = {since[k]:.6g} s"
             said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
         else:
             said = off_by(largest[k], scale[k], allowed[k], program.components)
-        how = f"a dt shorter than {options.step:g} s, or method='dop853', which chooses its steps"
-        warnings[k] = (f"{said}; rtol = {options.relative:g} allows less: take {how}",)
+        warnings[k] = (f"{said}{how}",)
     return {"error": largest.max(axis=1), "error_at_end": last.max(axis=1), "warnings": warnings}
 
 
-def _errors(first: Array, measured: Array, law: Law, bent: Flags) -> Array:
+def _errors(first: Array, measured: Array, law: Law) -> Array:
     """Errors of components, (k, m), from the first difference and by how much the second is larger.
 
     The law of the method holds if these have the ratio that goes with it, and that of another order if it is lower.
-    Across a kink it depends on where in a step that is: no ratio tells.
     """
     if law.ratio == 1.0:
         return first * law.share
     least = min(LEAST_RATIO, law.ratio)
     clipped = np.where(np.isfinite(measured), np.clip(measured, least, law.ratio), least)
     by_law = first * law.share * (law.ratio - 1.0) / (clipped - 1.0)
-    return np.where((first <= LAWLESS) & ~bent[:, None], by_law, first)
-
-
-class RunEstimate:
-    """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them."""
-
-    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
-        self._run, self._x, self._options = run, x, options
-        self._compared: _Whole | _Periods | None = None
-        self.seconds = 0.0  # spent here
-
-    def add(self, block: StepBlock) -> None:
-        """The next steps of the run, or a reset."""
-        if not self._options.estimated or not len(block.t):
-            return
-        begin, run = time.perf_counter(), self._run
-        assert isinstance(run, EqualStepper)
-        if self._compared is None:
-            p, program = np.array([run.parameters]), run.program
-            self._watch = Watch(program.rate, program.order, p, self._options.t0, self._x[None])
-            if run.control is None:
-                self._compared = _Whole(run, self._x, self._options)
-            else:
-                self._compared = _Periods(run, self._x, self._options.t0, self._watch)
-        if block.h[0] == 0.0:
-            self._watch.restart(float(block.t[0]), block.x)
-        else:
-            self._compared.add(block)
-            self._watch.add(block.t, block.x[None])
-        self.seconds += time.perf_counter() - begin
-
-    def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
-        """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
-        if self._compared is None:
-            return None, None, ()
-        begin, program = time.perf_counter(), self._run.program
-        law, compared = self._compared.comparison(self._run.largest, program.order)
-        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, compared)
-        error, last, said = [column[0] for column in columns.values()]
-        self.seconds += time.perf_counter() - begin
-        return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
+    return np.where(first <= LAWLESS, by_law, first)
 
 
 class _Rows:
@@ -230,47 +184,74 @@ class _Rows:
         self.resets[here], self.count = resets, max(self.count, here.stop)
 
 
-class _Whole:
-    """A run and runs beside it that go all the way, at instants at which steps of all end.
+class RunEstimate:
+    """Estimate of the error of a run from its blocks as they come, if it is to be estimated.
 
-    Runs with resets have these at other times, and are compared by their dense output where both have had as many.
+    Runs beside go all the way, and are compared where steps of all end; those with resets, which are at other times,
+    by their dense output where both have had as many.
     """
 
-    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
-        self._run, self._x, stretches = run, x, equal_steps(options.instants, options.step)
-        self._resetting = run.log is not None and run.log.resetting
-        if self._resetting:
-            stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
-        self._beside = runs_beside(stretches, run.program.order)
-        self._rows = _Rows(self._beside.t, x)
+    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
+        begin = time.perf_counter()
+        self._run, self._x, self._options = run, x, options
+        self._rows: _Rows | None = None
+        if isinstance(run, EqualStepper) and options.estimated and run.control is None:
+            stretches = equal_steps(options.instants, options.step)
+            self._resetting = run.log is not None and run.log.resetting
+            if self._resetting:
+                stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
+            self._beside = runs_beside(stretches, run.program.order)
+            self._rows = _Rows(self._beside.t, x)
+            self._watch = Watch(run.program.rate, np.array([run.parameters]), options.t0, x[None])
+        self.seconds = time.perf_counter() - begin  # spent here
 
     def add(self, block: StepBlock) -> None:
-        """The next steps of the run."""
-        self._rows.add(block, self._run.resets)
+        """The next steps of the run, or a reset."""
+        if self._rows is None or not len(block.t):
+            return
+        begin = time.perf_counter()
+        if block.h[0] == 0.0:
+            self._watch.restart(float(block.t[0]), block.x)
+        else:
+            self._rows.add(block, self._run.resets)
+            self._watch.add(block.t, block.x[None])
+        self.seconds += time.perf_counter() - begin
 
-    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
-        """What the runs beside tell, after the last step."""
-        one, law = self._rows, self._beside.law
+    def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
+        """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
+        if self._rows is None or self._rows.count == 1:
+            return None, None, ()
+        begin, run, law, one = time.perf_counter(), self._run, self._beside.law, self._rows
         t = one.t[: one.count]
         rows, alike = [one.x[None, : len(t)]], list[Flags]()
-        for stretches, _ in self._beside.runs if len(t) > 1 else ():
-            if self._resetting:
-                run = self._run.again(max([abs(part.h) for part in stretches]))
-            else:
-                run = self._run.beside(stretches, self._run.parameters)
-            other = _Rows(t, self._x)
-            for block in run.blocks(self._x * ASIDE):
-                if block.h[0] != 0.0:
-                    other.add(block, run.resets)
-                if other.count == len(t):
-                    break
-            if run.event:  # which has ended it before the other
-                other.resets[other.count :] = math.inf
+        for other in self._beside_rows(t):
             rows.append(other.x[None])
             alike.append(one.resets[: len(t)] == other.resets)
             one = other
-        lost = _parting_time(t, alike[0], law.longest, self._run.resets) if alike else math.nan
-        return law, Comparison(t, rows, alike, lost)
+        lost = _parting_time(t, alike[0], law.longest, run.resets)
+        columns = error_estimates(run.program, self._options, law, self._watch, run.steps, t, rows, alike, lost)
+        error, last, said = [column[0] for column in columns.values()]
+        self.seconds += time.perf_counter() - begin
+        return float(error), float(last), said
+
+    def _beside_rows(self, t: Array) -> Iterator[_Rows]:
+        """Rows of the runs beside, as far as instants t."""
+        main = self._run
+        assert isinstance(main, EqualStepper)
+        for stretches, _ in self._beside.runs:
+            if self._resetting:
+                run = main.again(max([abs(part.h) for part in stretches]))
+            else:
+                run = main.beside(stretches, main.parameters)
+            rows = _Rows(t, self._x)
+            for block in run.blocks(self._x * ASIDE):
+                if block.h[0] != 0.0:
+                    rows.add(block, run.resets)
+                if rows.count == len(t):
+                    break
+            if run.event:  # which has ended it before the other
+                rows.resets[rows.count :] = math.inf
+            yield rows
 
 
 def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
@@ -279,46 +260,3 @@ def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
     late = max(LATE * longest, SHARE * abs(t[-1] - t[0]) / (1 + resets))
     apart = np.flatnonzero((np.abs(t[ends - 1] - t[begins]) > late) | (2 * alike.sum() < len(t)))
     return float(t[begins[apart[0]]]) if len(apart) else math.nan
-
-
-class _Periods:
-    """Differences of a run's stretches of steps under the same forces of a controller, each compared by itself.
-
-    These forces answer the states of the run, and would be others beside it: from where the run is, steps of half the
-    length are made under the same. The differences add up.
-    """
-
-    _stretch: EqualSteps  # of which so many steps are done
-
-    def __init__(self, run: EqualStepper, x: Array, t0: float, watch: Watch) -> None:
-        self._run = run
-        self._watch, self._t0, self._since, self._steps = watch, t0, math.inf, 0
-        self._size, self._sum = np.abs(x), np.zeros(len(x))
-
-    def add(self, block: StepBlock) -> None:
-        """The next steps of the run."""
-        if not self._steps or self._run.stretch is not self._stretch:
-            self._compare()
-            self._stretch, self._forces = self._run.stretch, self._run.parameters
-            self._start, self._steps = block.x_old[0], 0
-            self._watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
-        self._size = np.maximum(self._size, np.abs(block.x).max(axis=0))
-        self._steps, self._t, self._end = self._steps + len(block.t), float(block.t[-1]), block.x[-1]
-
-    def _compare(self) -> None:
-        """Add the difference of the stretch, as far as it went."""
-        if not self._steps:
-            return
-        begin, steps, end = self._stretch.begin, 2 * self._steps, self._start
-        run = self._run.beside([EqualSteps(begin, (self._t - begin) / steps, steps, self._t)], self._forces)
-        for block in run.blocks(self._start):
-            end = block.x[-1]
-        self._sum = self._sum + (math.nan if run.status else np.abs(end - self._end))
-        if not np.isfinite(self._sum).all():
-            self._since = min(self._since, self._t)
-
-    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
-        """What the differences tell, after the last step, as those of two rows."""
-        self._compare()
-        rows = [np.array([[self._size] * 2]), np.array([[self._size, self._size + self._sum]])]
-        return law_of_halves(longest, order), Comparison(np.array([self._t0, self._since]), rows)

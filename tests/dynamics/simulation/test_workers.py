@@ -18,7 +18,7 @@ from pytest import mark, raises
 
 from cgraph.codegen import llvm_engine
 from dynamics import simulate_many
-from dynamics.simulation.ensembles import lanes, task, workers as workers_module
+from dynamics.simulation.ensembles import lanes, workers as workers_module
 from dynamics.simulation.steps import step_program
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
@@ -85,11 +85,8 @@ def test_an_executor_that_breaks_is_a_sentence() -> None:
 
 @mark.slow  # two processes that load the library
 @mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal on this system")
-@mark.parametrize("kind", ["executor", "map", "imap", "imap_unordered"])
-def test_a_killed_process_is_a_sentence(kind: str) -> None:
-    """Also in a `multiprocessing` pool, which would wait for ever for what the process had in hand."""
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, spawn) if kind == "executor" else spawn.Pool(2) as pool:
+def test_a_killed_process_is_a_sentence() -> None:
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
         list(pool.map(abs, range(8)))
 
         def kill() -> None:
@@ -108,7 +105,7 @@ def test_a_killed_process_is_a_sentence(kind: str) -> None:
                 "rk4",
                 dt=1e-3,
                 t_eval=[1e5],
-                workers=getattr(pool, kind.replace("executor", "map")),
+                workers=pool.map,
                 chunk=8,
             )
         timer.join()
@@ -171,18 +168,18 @@ def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str, ctrl_
 
 def test_ctrl_c_is_not_lost_at_the_end_of_a_chunk() -> None:
     """Machine code hands a signal on when it returns, and its chunk may be done then."""
-    made: list[Any] = []
+    made, to_end = list[Any](), lanes.LaneRun.to_end
 
     def interrupted(*arguments: Any) -> Any:
-        made.append(lanes.equal_in_lanes(*arguments))
+        made.append(to_end(*arguments))
         raise KeyboardInterrupt
 
-    with patch.object(task, "equal_in_lanes", interrupted), raises(KeyboardInterrupt):
+    with patch.object(lanes.LaneRun, "to_end", interrupted), raises(KeyboardInterrupt):
         simulate_many(*arms(96), 0.01, "rk4", t_eval=[0.01], chunk=32, estimate_error=False)
     assert len(made) == 1
 
 
-@patch.object(task, "equal_in_lanes", side_effect=RuntimeError("broken"))
+@patch.object(lanes.LaneRun, "to_end", side_effect=RuntimeError("broken"))
 def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(broken: object) -> None:
     before = set(threading.enumerate())
     with raises(RuntimeError, match="broken"):
