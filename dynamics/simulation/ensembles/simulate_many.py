@@ -32,8 +32,7 @@ from ..trajectory import SimulationWarning
 from ..unreached_momenta import unreached_momenta
 from .ensemble import Ensemble, Part, doubts
 from .store import Store, sweep_of
-from .task import Chunk, Task
-from .workers import Team, Workers, checked, finished
+from .task import Chunk, Task, Team, Workers, checked, finished
 
 
 class ManyOptions(Options, total=False):

@@ -1,19 +1,20 @@
-"""Task: the function that runs chunks of an ensemble, in lanes or one by one, in any thread or process."""
+"""Task: the function that runs chunks of an ensemble, in lanes or one by one, and who shares the chunks out."""
 
 from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Generator, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from cgraph._shared import Array
+from cgraph._shared import Array, thread_count
 
-from ..estimates.error_estimate import ASIDE, RunsBeside, error_estimates, runs_beside
-from ..estimates.unresolved import Watch
+from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates, runs_beside
 from ..events.event import EventProgram
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
@@ -29,6 +30,7 @@ ROWS = 2**22  # .. so many numbers
 SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
 UNKNOWN = 16  # workers behind a map, which does not say
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
+LOOK = 0.1  # s: not every system interrupts a wait without an end for Ctrl-C
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,7 @@ class Chunk:
 
 
 class Task:
-    """The function that runs chunks. It goes to other processes as it is, and is compiled there once.
-
-    count: rows of a trajectory.  largest: trajectories in a chunk at most, if they go in lanes, else 0.
-    """
+    """The function that runs chunks. It goes to other processes as it is, and is compiled there once."""
 
     def __init__(
         self, program: StepProgram, options: RunOptions, many: int, events: EventProgram | None = None
@@ -55,17 +54,15 @@ class Task:
         if not program.adaptive:
             self._grids, self._numbers = even_steps(options.instants, options.step)
         self._beside: RunsBeside | None = None
-        self.count, self.largest = len(options.row_times), 0
+        self.count = len(options.row_times)  # rows of a trajectory
+        self.largest = 0  # trajectories in a chunk at most, if they go in lanes
         if events is None and fits_lanes(program, options, self._grids, many):
             self._beside = runs_beside(self._grids, program.order) if options.estimated else None
             rows = self.count if self._beside is None else self.count + len(self._beside.t)
             self.largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // (program.steps.width * rows)))
 
-    def width(self, chunk: int | None, workers: object, *, stored: bool = False) -> int:
-        """Trajectories in a chunk: as asked for, or the shares of workers; in lanes whole vectors.
-
-        stored: whether a chunk that has not ended is lost when the process is, so that it should be small.
-        """
+    def width(self, chunk: int | None, workers: Team, *, stored: bool = False) -> int:
+        """Trajectories in a chunk: as asked for, or the shares of workers; in lanes whole vectors."""
         if chunk is None:
             shares = 1 if self._grids and self._many * self._grids[0].steps <= SHORT else SHARES
             shares *= workers if isinstance(workers, int) else UNKNOWN
@@ -78,10 +75,7 @@ class Task:
         return self.run(chunk, np.empty((len(chunk.x), self.count, chunk.x.shape[1])), lambda: False)
 
     def run(self, chunk: Chunk, rows: Array, stopped: Stopped) -> Part:
-        """Run the chunk into rows (k, T, m).
-
-        Raises KeyboardInterrupt soon after Ctrl-C, and StoppedError after `stopped`.
-        """
+        """Run the chunk into rows (k, T, m). Raises KeyboardInterrupt, and StoppedError after `stopped`."""
         part, left = Part(chunk.first, rows), list(range(len(chunk.x)))
         with np.errstate(all="ignore"):
             if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
@@ -93,15 +87,10 @@ class Task:
         return part
 
     def run_lanes(self, x: Array, p: Array, rows: Array, stopped: Stopped) -> LaneRuns | None:
-        """Run trajectories from states x (k, m) with parameters p (k, ..) in lanes; None if they do not go there.
-
-        rows: (k, T, m), receives their rows.
-        """
-        if not self.largest:
-            return None
+        """Run states x (k, m) with parameters p (k, ..) in lanes, into rows (k, T, m); None if they do not go there."""
         program, options, beside = self.program, self.options, self._beside
         with _lock:
-            lanes = lanes_of(program, options.backend, options.fma)
+            lanes = lanes_of(program, options.backend, options.fma) if self.largest else None
         if lanes is None:
             return None
         (own, *others), run = self._legs, LaneRun(lanes, program, options, x, p)
@@ -115,15 +104,14 @@ class Task:
         for legs, each in zip(others, states[1:], strict=True):
             LaneRun(lanes, program, options, x * ASIDE, p).to_end(legs, [each], stopped)
         steps = int(columns["steps"][0])
-        return whole, columns | error_estimates(program, options, beside.law, watch, steps, beside.t, [*states])
+        return whole, columns | error_estimates(program, options, beside, watch, steps, [*states])
 
     @cached_property
     def _tables(self) -> list[Numbers]:
         """How many equal steps are done at the rows, and when runs are looked at to be compared."""
         times, numbers = self.options.times, self._numbers
-        rows = (
-            np.arange(numbers[-1] + 1) if times is None else numbers[int(times[0] != self.options.t0) :][: len(times)]
-        )
+        first = 0 if times is None else int(times[0] != self.options.t0)
+        rows = np.arange(numbers[-1] + 1) if times is None else numbers[first : first + len(times)]
         return [rows, *([] if self._beside is None else [self._beside.numbers])]
 
     @cached_property
@@ -156,11 +144,80 @@ class Task:
             stats, recorder = outcome(run, x, self.options)
             if stats.message.startswith(INTERRUPTED):
                 raise KeyboardInterrupt
-            part.put(k, **{name: getattr(stats, name) for name in COLUMNS})
-            if run.log is not None:
-                part.put(k, happened=run.log.happened)
+            happened = () if run.log is None else run.log.happened
+            part.put(k, happened=happened, **{name: getattr(stats, name) for name in COLUMNS})
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code
+
+Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
+Team = int | Map | Executor  # number of threads, or who does the work
+Workers = Team | None
+
+
+def checked(workers: Workers) -> Team:
+    """The number of threads, the executor or the map. Raises ValueError for what is none of these."""
+    known: Any = workers
+    is_class = isinstance(known, type) and issubclass(known, Executor)
+    if isinstance(workers, Executor) or (callable(workers) and not is_class):
+        return workers
+    try:
+        return thread_count(known)
+    except ValueError:
+        kinds = "a whole number from 1, None for one on each core, an executor or a function like map"
+        raise ValueError(f"workers must be {kinds}, got {workers!r:.60}") from None
+
+
+def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -> Generator[Part, None, None]:
+    """The parts as they come, in any order; closing it, or an exception, ends the threads.
+
+    table: (N, T, m), in which threads make the rows. Raises TypeError for a map that gives something else than results,
+    RuntimeError for a process that was ended.
+    """
+    if isinstance(workers, int):
+        stop = threading.Event()
+
+        def run(chunk: Chunk) -> Part:
+            return task.run(chunk, table[chunk.first : chunk.first + len(chunk.x)], stop.is_set)
+
+        if workers == 1:
+            yield from map(run, chunks)
+            return
+        with ThreadPoolExecutor(min(workers, len(chunks))) as pool:  # which waits for its threads at any exit
+            try:
+                yield from _by_executor(pool, run, chunks)
+            finally:
+                stop.set()
+        return
+    done = 0
+    executor: object = workers if isinstance(workers, Executor) else getattr(workers, "__self__", None)
+    try:
+        if isinstance(executor, Executor):
+            results: object = _by_executor(executor, task, chunks)
+        elif callable(workers):
+            results = workers(task, chunks)
+        for part in results if isinstance(results, Iterable) else [results]:
+            if not isinstance(part, Part):
+                got = f"{type(part).__name__}: {part!r:.60}"
+                raise TypeError(f"workers must give the results of the function, as map does, got {got}")
+            yield part
+            done += 1
+    except BrokenExecutor:
+        came = f"{done} of {len(chunks)} chunks were here"
+        ended = f"a process of workers was ended from outside, as where memory runs out, when {came}"
+        raise RuntimeError(ended) from None
+
+
+def _by_executor(pool: Executor, run: Callable[[Chunk], Part], chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
+    """The parts as they end, none of which is kept: an executor's own map waits for the first, and holds the others."""
+    waiting = {pool.submit(run, chunk) for chunk in chunks}
+    try:
+        while waiting:
+            ended, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
+            while ended:
+                yield ended.pop().result()
+    finally:
+        for each in waiting:
+            each.cancel()

@@ -16,8 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph._shared import Array
+from cgraph import Graph, Node, floor, less, where
+from cgraph._shared import Array, kept_by_first
 
+from ...systems.arguments import TIME
 from ..run_options import RunOptions
 from ..stepper import EqualStepper, Stepper
 from ..steps.dense_output import StepBlock
@@ -30,9 +32,9 @@ from ..steps.equal_steps import (
     longer_steps,
     sampled_numbers,
 )
+from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags, off_by
 from ..steps.step_program import StepProgram
-from .unresolved import Watch
 
 APART_RATIO = 1.5  # the ratio of errors from which a difference of two runs tells them
 LEAST_RATIO = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
@@ -43,30 +45,20 @@ FOUR = 4  # steps, at whose ends those of all runs end
 LOOKS = 1024  # instants at which runs are compared, at most
 LATE, SHARE = 2.0, 0.1  # steps, or of the time between resets: runs parted for longer take other courses
 UNKNOWN = "the error is unknown"
-
-
-class Law(NamedTuple):
-    """How differences tell the error of a run whose longest step is so long [s].
-
-    share: of the first difference, that is error, if the error is a power of the step.  ratio: of the second difference
-    to the first then.
-    """
-
-    longest: float
-    share: float
-    ratio: float = 1.0
+TOGETHER = 512  # states that are looked at once
+WAVES = ("sin", "cos", "tan")
+JUMPS = ("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal")
 
 
 class RunsBeside(NamedTuple):
-    """Runs beside one of equal steps, which is looked at after so many of its steps, at instants t, (T,) each.
+    """Runs beside one of equal steps, the longest of which is so long [s], and how differences tell its error."""
 
-    runs: the steps of each, and how many are done then.
-    """
-
-    law: Law
-    runs: list[tuple[list[EqualSteps], Numbers]]
-    numbers: Numbers
-    t: Array
+    longest: float
+    share: float  # of the first difference that is error, if the error is a power of the step
+    ratio: float  # of the second difference to the first then; 1 without a second
+    runs: list[tuple[list[EqualSteps], Numbers]]  # the steps of each, and how many are done when they are compared
+    numbers: Numbers  # of its own steps that are done then, (T,)
+    t: Array  # (T,)
 
 
 def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
@@ -80,34 +72,93 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
         for each in (stretches, runs[0][0], runs[1][0])
     ]
     if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
-        return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
+        return RunsBeside(longest, one / (two - one), (four - two) / (two - one), runs, numbers, t)
+    numbers, share = sampled_numbers(steps, 1, LOOKS), 1.0 / (1.0 - 0.5**order)
     half = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
-    numbers = sampled_numbers(steps, 1, LOOKS)
-    law = Law(longest, 1.0 / (1.0 - 0.5**order))
-    return RunsBeside(law, [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
+    return RunsBeside(longest, share, 1.0, [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
+
+
+def _branches(node: Node) -> list[Node]:
+    """A number that changes only across the jump or the kink of a node's operation, if it has one."""
+    name, args = node.op.name, node.args
+    if name in JUMPS:
+        return [node]
+    if name in ("minimum", "maximum"):
+        return [less(*args)]
+    if name == "abs":
+        return [less(args[0], 0.0)]
+    if name == "fmod":
+        turns = args[0] / args[1]
+        return [where(less(turns, 0.0), -floor(-turns), floor(turns))]
+    return []
+
+
+@kept_by_first
+def unresolved(rate: Graph) -> tuple[Graph | None, int]:
+    """Phases of waves in time, then branches, over the inputs of a rate; None if it has neither. How many phases."""
+    timed = {node for node in rate.inputs if node.name == TIME}
+    for node in rate.nodes:
+        if not timed.isdisjoint(node.args):
+            timed.add(node)
+    waves = dict.fromkeys(node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed)
+    found = [*waves, *[branch for node in rate.nodes for branch in _branches(node)]]
+    return (Graph(rate.inputs, {f"y{k}": node for k, node in enumerate(found)}) if found else None), len(waves)
+
+
+class Watch:
+    """What steps of k runs side by side, from x (k, m) at t with parameters p (k, ..), do not resolve."""
+
+    def __init__(self, rate: Graph, p: Array, t: float, x: Array) -> None:
+        self._graph, self._waves = unresolved(rate)
+        self.needed = self._graph is not None
+        self.turning = np.zeros(len(x))  # of the fastest sines and cosines [rad/s]
+        self.bent = np.full(len(x), np.nan)  # start of the first step that passes a jump or a kink [s]
+        self._p, self._seen = p, list[tuple[Array, Array]]()
+        self.restart(t, x)
+
+    def restart(self, t: float, x: Array) -> None:
+        """The runs go on from other states x (k, m)."""
+        self.look()
+        self._seen = [(np.array([t]), x[:, None])]
+
+    def add(self, t: Array, x: Array) -> None:
+        """The next states, (k, r, m), at times t (r,)."""
+        if self.needed:
+            self._seen.append((t, x))
+            if sum([len(times) for times, _ in self._seen]) > TOGETHER:
+                self.look()
+
+    def look(self) -> None:
+        """Look at what has come."""
+        if self._graph is None or len(self._seen) < 2:
+            return
+        t, x = np.concatenate([t for t, _ in self._seen]), np.concatenate([x for _, x in self._seen], axis=1)
+        self._seen = [(t[-1:], x[:, -1:])]
+        columns = [*np.moveaxis(x, -1, 0), t, *np.moveaxis(self._p[:, None], -1, 0)]
+        change = np.abs(np.diff(values_of(self._graph, columns, *x.shape[:-1])))
+        speeds = change[: self._waves] / np.abs(np.diff(t))
+        self.turning = np.maximum(self.turning, speeds.max(axis=(0, 2), initial=0.0))
+        passes = (change[self._waves :] != 0.0).any(axis=0)
+        first = np.where(passes.any(axis=1), t[passes.argmax(axis=1)], np.nan)
+        self.bent = np.where(np.isnan(self.bent), first, self.bent)
 
 
 def error_estimates(
     program: StepProgram,
     options: RunOptions,
-    law: Law,
+    beside: RunsBeside,
     watch: Watch,
     steps: int,
-    t: Array,
     rows: Sequence[Array],
     alike: Sequence[Flags] = (),
     lost: float = math.nan,
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
-    The errors are relative to the sizes of components, NaN if nothing was compared, and infinite if unknown.
-    rows: states of the runs, and of those beside, (k, T, m) each, at t (T,); not finite where a run has stopped.
-    alike: which rows of each and the next can be compared; all by default.  lost: when one takes another course.
+    The errors are relative to the sizes of components, and infinite if unknown.  rows: states of the runs, and of those
+    beside, (k, T, m) each; not finite where a run has stopped.  alike: which rows of each and the next can be compared;
+    all by default.  lost: when one takes another course.
     """
-    many, warnings = len(rows[0]), np.empty(len(rows[0]), dtype=np.object_)
-    warnings.fill(())
-    if len(rows) == 1:
-        return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
     watch.look()
     apart = [other - one for one, other in itertools.pairwise(rows)]
     for k, each in enumerate(apart):
@@ -117,15 +168,16 @@ def error_estimates(
     at_end = int(np.flatnonzero(alike[0])[-1]) if alike else -1
     scale = program.kinds.scale(np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)))
     peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in apart]]
-    since = np.full(many, lost)
+    since, warnings = np.full(len(scale), lost), np.empty(len(scale), dtype=np.object_)
+    warnings.fill(())
     for k in np.flatnonzero(np.isinf(peaks[0]).any(axis=1)).tolist():
-        since[k] = t[np.argmin(np.isfinite(apart[0][k]).all(axis=1))]
+        since[k] = beside.t[np.argmin(np.isfinite(apart[0][k]).all(axis=1))]
     with np.errstate(all="ignore"):
         measured = peaks[-1] / peaks[0]
         shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], apart[0][:, at_end])]
-    largest, last = [np.maximum(UNIT * math.sqrt(steps), _errors(each, measured, law)) for each in shares]
+    largest, last = [np.maximum(UNIT * math.sqrt(steps), _errors(each, measured, beside)) for each in shares]
     largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
-    resolved = math.pi * max(1.0, 0.5 * program.order) / law.longest  # rad/s: two evaluations in a turn
+    resolved = math.pi * max(1.0, 0.5 * program.order) / beside.longest  # rad/s: two evaluations in a turn
     unknown = (watch.turning > resolved) | ~np.isnan(since) | ~np.isnan(watch.bent)
     largest[unknown] = last[unknown] = math.inf
     allowed = options.absolute + options.relative * scale
@@ -135,7 +187,7 @@ def error_estimates(
         if watch.turning[k] > resolved:
             said = (
                 f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
-                f"{law.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
+                f"{beside.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
             )
         elif not math.isnan(watch.bent[k]):
             said = f"{UNKNOWN} from t = {watch.bent[k]:.6g} s on: the rate has a jump or a kink there"
@@ -149,27 +201,22 @@ def error_estimates(
     return {"error": largest.max(axis=1), "error_at_end": last.max(axis=1), "warnings": warnings}
 
 
-def _errors(first: Array, measured: Array, law: Law) -> Array:
-    """Errors of components, (k, m), from the first difference and by how much the second is larger.
-
-    The law of the method holds if these have the ratio that goes with it, and that of another order if it is lower.
-    """
-    if law.ratio == 1.0:
-        return first * law.share
-    least = min(LEAST_RATIO, law.ratio)
-    clipped = np.where(np.isfinite(measured), np.clip(measured, least, law.ratio), least)
-    by_law = first * law.share * (law.ratio - 1.0) / (clipped - 1.0)
+def _errors(first: Array, measured: Array, beside: RunsBeside) -> Array:
+    """Errors of components, (k, m), from the first difference and how much the second is larger: the order it has."""
+    if beside.ratio == 1.0:
+        return first * beside.share
+    least = min(LEAST_RATIO, beside.ratio)
+    clipped = np.where(np.isfinite(measured), np.clip(measured, least, beside.ratio), least)
+    by_law = first * beside.share * (beside.ratio - 1.0) / (clipped - 1.0)
     return np.where(first <= LAWLESS, by_law, first)
 
 
 class _Rows:
-    """States (T, m) of a run that starts with x, at instants t (T,), and how many resets it has had.
-
-    count: of the instants that it has come to; beyond the states are NaN.
-    """
+    """States (T, m) of a run that starts with x, at instants t (T,), and how many resets it has had."""
 
     def __init__(self, t: Array, x: Array) -> None:
-        self.t, self.x, self.resets, self.count = t, np.full((len(t), len(x)), math.nan), np.zeros(len(t)), 1
+        self.t, self.x, self.resets = t, np.full((len(t), len(x)), math.nan), np.zeros(len(t))
+        self.count = 1  # of the instants that it has come to
         self.x[0], self._forth = x, np.sign(t[-1] - t[0])
         self._times = self._forth * t - SAME_INSTANT * np.spacing(np.abs(t).max())  # for those at which steps end
 
@@ -185,11 +232,7 @@ class _Rows:
 
 
 class RunEstimate:
-    """Estimate of the error of a run from its blocks as they come, if it is to be estimated.
-
-    Runs beside go all the way, and are compared where steps of all end; those with resets, which are at other times,
-    by their dense output where both have had as many.
-    """
+    """Estimate of the error of a run from its blocks as they come, if it is to be estimated."""
 
     def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
         begin = time.perf_counter()
@@ -197,6 +240,7 @@ class RunEstimate:
         self._rows: _Rows | None = None
         if isinstance(run, EqualStepper) and options.estimated and run.control is None:
             stretches = equal_steps(options.instants, options.step)
+            # Runs with resets, which are at other times, are compared by dense output where both have had as many.
             self._resetting = run.log is not None and run.log.resetting
             if self._resetting:
                 stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
@@ -221,15 +265,15 @@ class RunEstimate:
         """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
         if self._rows is None or self._rows.count == 1:
             return None, None, ()
-        begin, run, law, one = time.perf_counter(), self._run, self._beside.law, self._rows
+        begin, run, one = time.perf_counter(), self._run, self._rows
         t = one.t[: one.count]
         rows, alike = [one.x[None, : len(t)]], list[Flags]()
         for other in self._beside_rows(t):
             rows.append(other.x[None])
             alike.append(one.resets[: len(t)] == other.resets)
             one = other
-        lost = _parting_time(t, alike[0], law.longest, run.resets)
-        columns = error_estimates(run.program, self._options, law, self._watch, run.steps, t, rows, alike, lost)
+        lost = _parting_time(t, alike[0], self._beside.longest, run.resets)
+        columns = error_estimates(run.program, self._options, self._beside, self._watch, run.steps, rows, alike, lost)
         error, last, said = [column[0] for column in columns.values()]
         self.seconds += time.perf_counter() - begin
         return float(error), float(last), said

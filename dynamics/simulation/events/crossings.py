@@ -40,32 +40,22 @@ class Crossing(NamedTuple):
 
 @dataclass
 class Side:
-    """Side of zero on which a quantity is, between one part of a run and the next.
+    """Side of zero on which a quantity is, between one part of a run and the next."""
 
-    sign: its last, 0 before it has one; of one at rest on zero, that of the side that it belongs to, if there is one.
-    slope: at the end of the last step; NaN at a start.
-    leaving: whether it starts on zero and moves to this side.  resting: whether it has been zero, to rounding, since
-    the start of the run or the last reset.
-    waiting: whether it is zero at the last instant, and what it does there is for the next step to tell.
-    """
-
-    sign: float = 0.0
-    slope: float = math.nan
-    leaving: bool = False
-    resting: bool = False
-    waiting: bool = False
+    sign: float = 0.0  # its last, 0 before it has one; at rest on zero that of the side that it belongs to, if any
+    slope: float = math.nan  # at the end of the last step
+    leaving: bool = False  # whether it starts on zero and moves to this side
+    resting: bool = False  # whether it has been zero, to rounding, since the start or the last reset
+    waiting: bool = False  # whether it is zero at the last instant: the next step tells what it does there
 
 
 class WatchedSteps(NamedTuple):
-    """Consecutive steps with dense output, and the quantity of an event at shares s, (k,) or (k, parts), of rows (k,).
-
-    noise: what the rounding of the quantity is at least.
-    """
+    """Steps with dense output, and the quantity of an event at shares s, (k,) or (k, parts), of rows (k,)."""
 
     event: WatchedEvent
     parameters: Sequence[float]
     block: StepBlock
-    noise: float = 0.0
+    noise: float = 0.0  # what the rounding of the quantity is at least
 
     def _points(self, rows: Indices, s: Array) -> tuple[Indices, Array, Array, Array]:
         rows, s = np.repeat(rows, s.size // max(1, len(rows))), s.ravel()
@@ -125,11 +115,9 @@ class Cells(NamedTuple):
         return np.stack([self.g_a, self.g_a + self.slope_a * third, self.g_b - self.slope_b * third, self.g_b])
 
     def clear(self) -> Flags:
-        """Whether the quantity cannot be zero there, (k,).
-
-        It stays in the hull of the control points, and where it turns between the ends, as |x| may do at once, also on
-        this side of the point where the tangents at the ends meet.
-        """
+        """Whether the quantity cannot be zero there, (k,)."""
+        # It stays in the hull of the control points, and where it turns, as |x| may do at once, also on this side of
+        # the point where the tangents at the ends meet.
         points, sign = self.control_points(), np.sign(self.g_a)
         hull = (points * sign > MARGIN * self.miss).all(axis=0)
         turns = (self.slope_a * sign < 0.0) & (self.slope_b * sign > 0.0)
@@ -139,15 +127,11 @@ class Cells(NamedTuple):
         return clear
 
     def resolved(self) -> Flags:
-        """Whether the ends tell how often it is zero, (k,).
-
-        It is not; or it is monotone; or its slope is, so that it has one extremum; or it is zero all over; or it is no
-        number, and nothing can be told.
-        """
+        """Whether the ends tell how often it is zero, (k,): not, everywhere, or nothing can be told of what is NaN."""
         points, margin = self.control_points(), MARGIN * self.miss
         zero, none = np.abs(points).max(axis=0) <= 2.0 * self.rounding, ~np.isfinite(points).all(axis=0)
         told: Flags = self.clear() | zero | none
-        for order in (1, 2):
+        for order in (1, 2):  # or it is monotone, or its slope is, so that it has one extremum
             differences = np.diff(points, order, axis=0)
             told |= (differences > margin).all(axis=0) | (differences < -margin).all(axis=0)
         return told
@@ -178,10 +162,7 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
 
 
 def _halves(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> tuple[Cells, Cells]:
-    """Halves of cells. The cubic of a cell, compared with value and slope in its middle, tells how far theirs are off.
-
-    bounded: whether the rounding is asked for; that of whole steps seldom matters.
-    """
+    """Halves of cells; how far their cubics miss is told by value and slope in the middle. bounded: with rounding."""
     width = cells.b - cells.a
     middle = cells.a + 0.5 * width
     g, slope = steps.values(cells.rows, middle), steps.slopes(cells.rows, middle)
@@ -198,9 +179,8 @@ def _halves(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> tuple[Cells,
 def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
     """Crossings in these steps, and flags of (steps,) in which more may have happened; moves `side` on.
 
-    A quantity crosses zero where its sign turns, and touches it where an extremum is zero to the rounding of its
-    evaluation. One that stays zero does so from where it arrives; one that rests there, and leaves to the other side
-    than its own, crosses zero where it leaves.
+    Touching is an extremum that is zero to rounding. What stays zero arrives once; what rests and leaves to the other
+    side than its own crosses zero where it leaves.
     """
     cells, beyond = event_cells(steps)
     # where steps meet, the slope is that at the end of the step before: a turn counts once
@@ -281,10 +261,7 @@ def _at_extrema(steps: WatchedSteps, cells: Cells) -> tuple[Cells, Indices]:
 
 
 def _add_rounded_zeros(zero: Flags, beside: Indices, rounded: Callable[[Indices], Flags]) -> None:
-    """Flag looks that are zero to rounding near an extremum, a change of sign, or another look at zero.
-
-    beside: looks at extrema, and those before which the sign changes.
-    """
+    """Flag looks that are zero to rounding near another at zero or `beside`: at an extremum, or after a sign turns."""
     tested, near = np.zeros(len(zero), dtype=bool), np.flatnonzero(zero)
     while True:
         looks = np.unique(np.concatenate([near - 1, near, near + 1, beside - 1, beside]))
@@ -298,10 +275,7 @@ def _add_rounded_zeros(zero: Flags, beside: Indices, rounded: Callable[[Indices]
 
 
 def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:
-    """The shares (k,) between which `same`, true at `low` and false at `high`, first turns: one apart in the last bit.
-
-    same: of shares (k, parts) whether it is true.
-    """
+    """Shares (k,), one apart in the last bit, between which `same`, true at `low` and false at `high`, first turns."""
     if not len(low):
         return low, high
     parts = max(2, min(PARTS, AT_ONCE // len(low)))

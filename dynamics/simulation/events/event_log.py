@@ -43,20 +43,14 @@ class _Look(NamedTuple):
 
 
 class EventLog:
-    """The events of a run, (number, t, x) each in `happened`.
-
-    ended: the event that has ended the run, in words.  status: why a reset has stopped it.
-    parameters: of the rate, those of the block that is to come.
-    restart: (t, x, x_new), the state that was reset and the one to go on from, else None.
-    said: {(number of an event, what): sentence}, once each.  resetting: whether there are events that reset the state.
-    """
+    """The events of a run."""
 
     def __init__(self, program: EventProgram) -> None:
         self.program, self.resetting = program, any([event.reset is not None for event in program.events])
-        self.parameters: Sequence[float] = ()
-        self.ended = self.status = ""
-        self.restart: tuple[float, Array, Array] | None = None
-        self.said: dict[tuple[int, str], str] = {}
+        self.parameters: Sequence[float] = ()  # of the rate, in the block that is to come
+        self.ended = self.status = ""  # the event that has ended the run, and why a reset has stopped it
+        self.restart: tuple[float, Array, Array] | None = None  # time, the state that was reset, the one to go on from
+        self.said: dict[tuple[int, str], str] = {}  # sentences, by the number of an event and what they say
         self.happened: list[Happening] = []
         self._sides: list[Side] = []  # none before the first step
         self._from = np.array([-float(event.direction) for event in program.events])  # sides, see `Crossing`
@@ -71,12 +65,11 @@ class EventLog:
         for first in range(0, len(block.t), STEPS):
             part = block.part(slice(first, first + STEPS))
             found = self._found(part)
-            rows, s = np.array([one[0] for one in found], dtype=np.intp), np.array([one[1] for one in found])
+            rows, s = np.array([one.row for one, _ in found], dtype=np.intp), np.array([one.s for one, _ in found])
             instants = zip(found, part.times_at(rows, s).tolist(), part.states_at(rows, s), strict=True)
-            for (row, share), group in itertools.groupby(instants, lambda one: one[0][:2]):
-                together = list(group)
-                _, t, x = together[0]
-                arrived = {number: one for (_, _, number, one), _, _ in together}
+            for (row, share), group in itertools.groupby(instants, lambda each: each[0][0][:2]):
+                (first_one, t, x), *others = group
+                arrived = {number: one for one, number in [first_one, *[each for each, _, _ in others]]}
                 if self._happen(part.part(slice(row + 1)), t, x, arrived):
                     return block.part(slice(first + row + (share > 0.0))).ending(t, x)
             self._see(part, len(part.t), part.x[-1])
@@ -99,9 +92,9 @@ class EventLog:
             waiting = {number: Crossing(0, 1.0, side.sign, touching=False) for number, side in sides if side.waiting}
             self._happen(self._last, float(self._last.t[0]), self._last.x[0], waiting)
 
-    def _found(self, part: StepBlock) -> list[tuple[int, float, int, Crossing]]:
-        """Step, share of it, number of the event, and what its quantity does, of crossings in these steps, in order."""
-        found, events = list[tuple[int, float, int, Crossing]](), self.program.events
+    def _found(self, part: StepBlock) -> list[tuple[Crossing, int]]:
+        """Crossings in these steps, and the numbers of the events, in order."""
+        found, events = list[tuple[Crossing, int]](), self.program.events
         self._see(part, 0, part.x_old[0])
         if not self._sides:  # zero, to rounding, is rest; with a reset, on the side to come from
             own = [0.0 if event.reset is None else side for event, side in zip(events, self._from, strict=True)]
@@ -109,19 +102,16 @@ class EventLog:
         for number, side in enumerate(self._sides):
             noise = self._noise(number, float(part.t[-1]), part.x[-1]) if side.resting else 0.0
             some, beyond = crossings(WatchedSteps(events[number], self.parameters, part, noise), side)
-            found += [(one.row, one.s, number, one) for one in some]
+            found += [(one, number) for one in some]
             if beyond.any():
                 self._say(number, MISSED, part.t_old[np.argmax(beyond)])
-        return sorted(found)
+        return sorted(found, key=lambda each: (*each[0][:2], each[1]))
 
     def _see(self, part: StepBlock, steps: int, x: Array) -> None:
-        """The run came to x by the first steps of a part: how far its states have gone, and how many roundings old.
-
-        Rates tell what a reset leaves at rest.
-        """
+        """The run came to x by the first steps of a part: how far its states have gone, and how many roundings old."""
         self._steps += steps
         seen = [np.vstack([part.x_old[:steps], x])]
-        if self.resetting:
+        if self.resetting:  # rates tell what a reset leaves at rest
             times = np.append(part.t_old[:steps], part.t_old[0] if steps == 0 else part.t[steps - 1])
             seen.append(self.program.rates(times, seen[0], self.parameters))
         for k, values in enumerate(seen):
@@ -152,11 +142,10 @@ class EventLog:
         return resets or bool(self.ended)
 
     def _reset(self, step: StepBlock, t: float, x: Array, new: Mapping[int, Crossing], rested: Flags) -> None:
-        """Reset the state at an instant of a step.
+        """Reset the state at an instant of a step.  rested: what was at zero at the start of the step.
 
         One rule: what is due and has no reset happens, then the first reset that is due, and it is looked again. Due is
-        what is zero and moves to the other side than it has come from; what touches, once. One that ends the run does
-        so before any reset.  rested: what was at zero at the start of the step.
+        what is zero and moves to the other side than it has come from; what touches, once.
         """
         events, start, resets, look = self.program.events, x, list[int](), self._look(t, x, step)
         touching = {number for number, one in new.items() if one.touching}
@@ -226,10 +215,7 @@ class EventLog:
 
     @property
     def _roundings(self) -> float:
-        """Rounding errors of states by now, relative to how far they have gone.
-
-        Roundings of steps add up at random; a rate that is off takes its state off by that share of the whole way.
-        """
+        """Rounding errors of states by now, relative to how far they have gone: those of steps add up at random."""
         return UNIT * ROUNDED * math.sqrt(1.0 + self._steps)
 
     def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:

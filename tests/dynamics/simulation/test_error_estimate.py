@@ -144,12 +144,12 @@ def test_runs_beside_have_other_steps_that_meet_those_of_the_run(
 ) -> None:
     instants = (direction * np.cumsum([0.0, *gaps])).tolist()
     first = equal_steps(instants, dt)
-    law, beside, numbers, t = runs_beside(first, 4)
-    assert law.longest == max(abs(part.h) for part in first)
+    longest, _, _, beside, numbers, t = runs_beside(first, 4)
+    assert longest == max(abs(part.h) for part in first)
     for times, (steps, done) in zip((1.0, 2.0, 4.0), [(first, numbers), *beside], strict=False):
         assert (steps[0].begin, steps[-1].end) == (0.0, instants[-1])
         assert all(part.end == after.begin for part, after in itertools.pairwise(steps))
-        assert all(0.0 < direction * part.h <= 2.0 * times * law.longest * (1.0 + 1e-9) for part in steps)
+        assert all(0.0 < direction * part.h <= 2.0 * times * longest * (1.0 + 1e-9) for part in steps)
         ends = [part.begin + part.h * np.arange(1.0, part.steps + 1.0) for part in steps]
         assert np.concatenate([[0.0], *ends])[done] == approx(t, rel=1e-12, abs=1e-12)
     assert (t[0], t[-1]) == (0.0, instants[-1])

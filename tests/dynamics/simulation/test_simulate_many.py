@@ -159,7 +159,12 @@ Q = np.zeros((4, 2))
             {"workers": 0},
             "workers must be a whole number from 1, None for one on each core, an executor or a function",
         ),
-        (Q, Q, {"workers": ThreadPoolExecutor}, "an executor, and ThreadPoolExecutor is the class of one"),
+        (
+            Q,
+            Q,
+            {"workers": ThreadPoolExecutor},
+            "workers must be .* or a function like map, got <class .*ThreadPoolEx",
+        ),
         (Q, Q, {"workers": lambda f, each: []}, "a result for each item, as map does: of 4 trajectories came back 0"),
     ],
 )

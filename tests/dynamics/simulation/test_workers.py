@@ -18,7 +18,7 @@ from pytest import mark, raises
 
 from cgraph.codegen import llvm_engine
 from dynamics import simulate_many
-from dynamics.simulation.ensembles import lanes, workers as workers_module
+from dynamics.simulation.ensembles import lanes, task
 from dynamics.simulation.steps import step_program
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
@@ -194,9 +194,9 @@ def test_workers_that_give_no_results_are_refused() -> None:
 
 def test_an_interrupt_while_chunks_are_handed_out_ends_the_threads() -> None:
     """Whatever the instant: the pool waits for its threads, and these have to be told."""
-    submit = workers_module.ThreadPoolExecutor.submit
+    submit = task.ThreadPoolExecutor.submit
 
-    class Interrupted(workers_module.ThreadPoolExecutor):
+    class Interrupted(task.ThreadPoolExecutor):
         def submit(self, *arguments: Any) -> Any:
             future = submit(self, *arguments)
             if len(self._threads) > 1:
@@ -205,6 +205,6 @@ def test_an_interrupt_while_chunks_are_handed_out_ends_the_threads() -> None:
 
     before = set(threading.enumerate())
     model, q, qd = arms(64)
-    with suppress(KeyboardInterrupt), patch.object(workers_module, "ThreadPoolExecutor", Interrupted):
+    with suppress(KeyboardInterrupt), patch.object(task, "ThreadPoolExecutor", Interrupted):
         simulate_many(model, q, qd, 1e9, "rk4", t_eval=[0.0, 1e9], workers=3, chunk=8)
     assert set(threading.enumerate()) <= before
