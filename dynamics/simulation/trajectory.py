@@ -67,9 +67,9 @@ class Stats:
         in units of the largest value of a component over the run, of the component where it is largest. It is the
         difference from a run of steps twice as long over 2^k - 1, where one of steps four times as long tells the order
         k, at most the method's; where it is large, the difference itself. Runs are compared at up to a thousand
-        instants, and where they have had as many resets. Infinite where it is unknown, as where the rate has a jump or
-        a kink on the way, which a warning explains. None of chosen steps, of runs without `estimate_error` or with a
-        SampledController, and of those that fail or end in the first steps.
+        instants. Infinite where it is unknown, as where the rate has a jump or a kink on the way, which a warning
+        explains. None of chosen steps, of runs without `estimate_error`, with a SampledController or events that reset
+        the state, and of those that fail or end in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
     njev_cost, nlu_cost : float

@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +33,7 @@ from ..steps.equal_steps import (
     sampled_numbers,
 )
 from ..steps.row_values import values_of
-from ..steps.state_sizes import Flags, off_by
+from ..steps.state_sizes import off_by
 from ..steps.step_program import StepProgram
 
 APART_RATIO = 1.5  # the ratio of errors from which a difference of two runs tells them
@@ -43,7 +43,6 @@ UNIT = 2.0**-52  # the last bit of a number near 1
 ASIDE = 1.0 + 8.0 * UNIT  # times each component, runs beside start: what roundings grow to is part of the error
 FOUR = 4  # steps, at whose ends those of all runs end
 LOOKS = 1024  # instants at which runs are compared, at most
-LATE, SHARE = 2.0, 0.1  # steps, or of the time between resets: runs parted for longer take other courses
 UNKNOWN = "the error is unknown"
 TOGETHER = 512  # states that are looked at once
 WAVES = ("sin", "cos", "tan")
@@ -113,13 +112,7 @@ class Watch:
         self.needed = self._graph is not None
         self.turning = np.zeros(len(x))  # of the fastest sines and cosines [rad/s]
         self.bent = np.full(len(x), np.nan)  # start of the first step that passes a jump or a kink [s]
-        self._p, self._seen = p, list[tuple[Array, Array]]()
-        self.restart(t, x)
-
-    def restart(self, t: float, x: Array) -> None:
-        """The runs go on from other states x (k, m)."""
-        self.look()
-        self._seen = [(np.array([t]), x[:, None])]
+        self._p, self._seen = p, [(np.array([t]), x[:, None])]
 
     def add(self, t: Array, x: Array) -> None:
         """The next states, (k, r, m), at times t (r,)."""
@@ -130,7 +123,7 @@ class Watch:
 
     def look(self) -> None:
         """Look at what has come."""
-        if self._graph is None or len(self._seen) < 2:
+        if self._graph is None or len(self._seen) == 1:
             return
         t, x = np.concatenate([t for t, _ in self._seen]), np.concatenate([x for _, x in self._seen], axis=1)
         self._seen = [(t[-1:], x[:, -1:])]
@@ -150,31 +143,25 @@ def error_estimates(
     watch: Watch,
     steps: int,
     rows: Sequence[Array],
-    alike: Sequence[Flags] = (),
-    lost: float = math.nan,
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
     The errors are relative to the sizes of components, and infinite if unknown.  rows: states of the runs, and of those
-    beside, (k, T, m) each; not finite where a run has stopped.  alike: which rows of each and the next can be compared;
-    all by default.  lost: when one takes another course.
+    beside, (k, T, m) each; not finite where a run has stopped.
     """
     watch.look()
     apart = [other - one for one, other in itertools.pairwise(rows)]
-    for k, each in enumerate(apart):
+    for each in apart:
         np.abs(each, out=each)
-        if alike:
-            each[:, ~alike[k]] = 0.0
-    at_end = int(np.flatnonzero(alike[0])[-1]) if alike else -1
     scale = program.kinds.scale(np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)))
     peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in apart]]
-    since, warnings = np.full(len(scale), lost), np.empty(len(scale), dtype=np.object_)
+    since, warnings = np.full(len(scale), math.nan), np.empty(len(scale), dtype=np.object_)
     warnings.fill(())
     for k in np.flatnonzero(np.isinf(peaks[0]).any(axis=1)).tolist():
         since[k] = beside.t[np.argmin(np.isfinite(apart[0][k]).all(axis=1))]
     with np.errstate(all="ignore"):
         measured = peaks[-1] / peaks[0]
-        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], apart[0][:, at_end])]
+        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], apart[0][:, -1])]
     largest, last = [np.maximum(UNIT * math.sqrt(steps), _errors(each, measured, beside)) for each in shares]
     largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
     resolved = math.pi * max(1.0, 0.5 * program.order) / beside.longest  # rad/s: two evaluations in a turn
@@ -193,8 +180,7 @@ def error_estimates(
             said = f"{UNKNOWN} from t = {watch.bent[k]:.6g} s on: the rate has a jump or a kink there"
             how = ": take method='dop853', which finds its way across"
         elif not math.isnan(since[k]):
-            at = f"t = {since[k]:.6g} s"
-            said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
+            said = f"{UNKNOWN}: beside it a run of other steps stops at t = {since[k]:.6g} s"
         else:
             said = off_by(largest[k], scale[k], allowed[k], program.components)
         warnings[k] = (f"{said}{how}",)
@@ -212,95 +198,58 @@ def _errors(first: Array, measured: Array, beside: RunsBeside) -> Array:
 
 
 class _Rows:
-    """States (T, m) of a run that starts with x, at instants t (T,), and how many resets it has had."""
+    """States (T, m) of a run that starts with x, at instants t (T,)."""
 
     def __init__(self, t: Array, x: Array) -> None:
-        self.t, self.x, self.resets = t, np.full((len(t), len(x)), math.nan), np.zeros(len(t))
-        self.count = 1  # of the instants that it has come to
-        self.x[0], self._forth = x, np.sign(t[-1] - t[0])
+        self.x, self._forth = np.full((len(t), len(x)), math.nan), np.sign(t[-1] - t[0])
+        self.x[0], self.count = x, 1  # of the instants that it has come to
         self._times = self._forth * t - SAME_INSTANT * np.spacing(np.abs(t).max())  # for those at which steps end
 
-    def add(self, block: StepBlock, resets: int) -> None:
-        """The next steps, before which it had so many resets."""
+    def add(self, block: StepBlock) -> None:
+        """The next steps."""
         ends = self._forth * block.t
         here = slice(self.count, int(np.searchsorted(self._times, ends[-1], side="right")))
-        if block.dense is None:
-            self.x[here] = block.x[np.searchsorted(ends, self._times[here])]
-        else:
-            self.x[here] = block.at(self._forth * np.minimum(self._forth * self.t[here], ends[-1]))
-        self.resets[here], self.count = resets, max(self.count, here.stop)
+        self.x[here] = block.x[np.searchsorted(ends, self._times[here])]
+        self.count = max(self.count, here.stop)
 
 
 class RunEstimate:
     """Estimate of the error of a run from its blocks as they come, if it is to be estimated."""
 
     def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
-        begin = time.perf_counter()
-        self._run, self._x, self._options = run, x, options
+        self._run, self._x, self._options, self.seconds = run, x, options, 0.0  # spent here
         self._rows: _Rows | None = None
-        if isinstance(run, EqualStepper) and options.estimated and run.control is None:
-            stretches = equal_steps(options.instants, options.step)
-            # Runs with resets, which are at other times, are compared by dense output where both have had as many.
-            self._resetting = run.log is not None and run.log.resetting
-            if self._resetting:
-                stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
-            self._beside = runs_beside(stretches, run.program.order)
+        resetting = run.log is not None and run.log.resetting
+        if isinstance(run, EqualStepper) and options.estimated and run.control is None and not resetting:
+            begin = time.perf_counter()
+            self._beside = runs_beside(equal_steps(options.instants, options.step), run.program.order)
             self._rows = _Rows(self._beside.t, x)
             self._watch = Watch(run.program.rate, np.array([run.parameters]), options.t0, x[None])
-        self.seconds = time.perf_counter() - begin  # spent here
+            self.seconds = time.perf_counter() - begin
 
     def add(self, block: StepBlock) -> None:
-        """The next steps of the run, or a reset."""
-        if self._rows is None or not len(block.t):
-            return
-        begin = time.perf_counter()
-        if block.h[0] == 0.0:
-            self._watch.restart(float(block.t[0]), block.x)
-        else:
-            self._rows.add(block, self._run.resets)
+        """The next steps of the run."""
+        if self._rows is not None and len(block.t):
+            begin = time.perf_counter()
+            self._rows.add(block)
             self._watch.add(block.t, block.x[None])
-        self.seconds += time.perf_counter() - begin
+            self.seconds += time.perf_counter() - begin
 
     def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
-        """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
+        """After the last step: the largest error and that at the end, None if not estimated, and a warning of it."""
         if self._rows is None or self._rows.count == 1:
             return None, None, ()
-        begin, run, one = time.perf_counter(), self._run, self._rows
-        t = one.t[: one.count]
-        rows, alike = [one.x[None, : len(t)]], list[Flags]()
-        for other in self._beside_rows(t):
+        begin, run, beside, count = time.perf_counter(), self._run, self._beside, self._rows.count
+        assert isinstance(run, EqualStepper)
+        rows = [self._rows.x[None, :count]]
+        for stretches, _ in beside.runs:
+            other = _Rows(beside.t[:count], self._x)
+            for block in run.beside(stretches, run.parameters).blocks(self._x * ASIDE):
+                other.add(block)
+                if other.count == count:
+                    break
             rows.append(other.x[None])
-            alike.append(one.resets[: len(t)] == other.resets)
-            one = other
-        lost = _parting_time(t, alike[0], self._beside.longest, run.resets)
-        columns = error_estimates(run.program, self._options, self._beside, self._watch, run.steps, rows, alike, lost)
+        columns = error_estimates(run.program, self._options, beside, self._watch, run.steps, rows)
         error, last, said = [column[0] for column in columns.values()]
         self.seconds += time.perf_counter() - begin
         return float(error), float(last), said
-
-    def _beside_rows(self, t: Array) -> Iterator[_Rows]:
-        """Rows of the runs beside, as far as instants t."""
-        main = self._run
-        assert isinstance(main, EqualStepper)
-        for stretches, _ in self._beside.runs:
-            if self._resetting:
-                run = main.again(max([abs(part.h) for part in stretches]))
-            else:
-                run = main.beside(stretches, main.parameters)
-            rows = _Rows(t, self._x)
-            for block in run.blocks(self._x * ASIDE):
-                if block.h[0] != 0.0:
-                    rows.add(block, run.resets)
-                if rows.count == len(t):
-                    break
-            if run.event:  # which has ended it before the other
-                rows.resets[rows.count :] = math.inf
-            yield rows
-
-
-def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
-    """When runs with so many resets have other ones for longer than their steps explain; NaN if they have not."""
-    begins, ends = np.flatnonzero(np.diff(~alike, prepend=False, append=False)).reshape(-1, 2).T
-    late = max(LATE * longest, SHARE * abs(t[-1] - t[0]) / (1 + resets))
-    apart = np.flatnonzero((np.abs(t[ends - 1] - t[begins]) > late) | (2 * alike.sum() < len(t)))
-    return float(t[begins[apart[0]]]) if len(apart) else math.nan

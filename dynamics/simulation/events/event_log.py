@@ -105,7 +105,7 @@ class EventLog:
             found += [(one, number) for one in some]
             if beyond.any():
                 self._say(number, MISSED, part.t_old[np.argmax(beyond)])
-        return sorted(found, key=lambda each: (*each[0][:2], each[1]))
+        return sorted(found, key=lambda each: (*each[0][:2], each[1], each[0]))
 
     def _see(self, part: StepBlock, steps: int, x: Array) -> None:
         """The run came to x by the first steps of a part: how far its states have gone, and how many roundings old."""

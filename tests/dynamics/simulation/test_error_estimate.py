@@ -127,9 +127,7 @@ def test_a_second_run_that_fails_says_that_nothing_is_known() -> None:
         run = dyn.simulate(blow, [1.9], None, 1.0, "rk4", dt=0.25)
     assert run.stats.error > 1e-3
     stiff = dyn.OdeSystem(lambda x, t: [-1000.0 * x[0] ** 3], ["x"])
-    with warns(
-        dyn.SimulationWarning, match="the error is unknown: beside it a run of other steps stops, or .* at t = 0.01"
-    ):
+    with warns(dyn.SimulationWarning, match="the error is unknown: beside it a run of other steps stops at t = 0.01"):
         run = dyn.simulate(stiff, [1.0], None, 1.0, "rk4", dt=1.5e-3)
     assert (run.stats.error, run.success) == (math.inf, True)
 
@@ -245,12 +243,10 @@ def test_what_roundings_grow_to_near_a_separatrix_is_part_of_the_error(dt: float
     assert run.stats.warnings
 
 
-def test_a_run_beside_with_other_resets_says_that_nothing_is_known() -> None:
-    """Longer steps of Euler's method gain so much energy that they reach a wall which the run does not reach."""
-    wall = dyn.Event("wall", lambda q, qd, t: q[0] - 1.1, 1, reset=lambda q, qd, t: (q, [-qd[0]]))
-    with warns(dyn.SimulationWarning, match="the error is unknown: beside it a run .* takes another course, at t = "):
-        run = dyn.simulate(spring(), [1.0], [0.0], 7.0, "euler", dt=0.02, events=wall)
-    assert (len(run.events["wall"].t), run.stats.error) == (0, math.inf)
+def test_no_error_is_estimated_where_events_reset_the_state() -> None:
+    wall = dyn.Event("wall", lambda q, qd, t: q[0] - 0.5, 1, reset=lambda q, qd, t: (q, [-qd[0]]))
+    run = dyn.simulate(spring(), [0.0], [1.0], 7.0, "rk4", dt=0.02, events=wall)
+    assert (run.stats.error, run.stats.error_at_end, run.stats.warnings) == (None, None, ())
 
 
 @mark.parametrize("method", ["rk4", *slow("euler", "verlet", "gauss6")])
