@@ -27,23 +27,16 @@ class EnsembleStats:
     ----------
     method : str
         As `simulate_many` was asked for it.
-    steps, rejected, nfev : ndarray
-        Accepted steps, trials of a step that were not accepted, and evaluations of the rate, (N,) each.
-    dt : ndarray
-        The largest step taken, (N,) [s].
+    steps, rejected, nfev, dt : ndarray
+        Those of `Stats`, (N,) each.
     seconds : float
         Run time of all of them together [s], compiling included.
-    success : ndarray
-        Whether it reached t_end, (N,).
-    message : tuple of str
-        N sentences: "reached t_end", or where and why it stopped.
-    status : ndarray
-        0: its end was reached; 1: an event ended it, where its end is: `success` is True, and its rows from there on
-        NaN; -1: it failed, (N,).
+    success, status : ndarray
+        Those of `Stats`, (N,) each; one that an event ended has rows that are NaN from there on.
+    message, warnings : tuple
+        N sentences, "reached t_end", or where and why it stopped; and N tuples of what speaks against each result.
     error, error_at_end : ndarray
-        Of equal steps, the estimated errors of `Stats`, (N,); NaN of a trajectory that has none.
-    warnings : tuple of tuple of str
-        What speaks against each result, N tuples.
+        Those of `Stats`, (N,) each; NaN of a trajectory that has none.
 
     Examples
     --------
@@ -77,24 +70,20 @@ COLUMNS: dict[str, type] = {
 
 def doubts(stats: EnsembleStats) -> list[str]:
     """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
-    early = np.flatnonzero(stats.status < 0)
+    early, many = np.flatnonzero(stats.status < 0), f"of {len(stats.warnings)} trajectories"
     doubtful = [k for k, texts in enumerate(stats.warnings) if texts] if any(stats.warnings) else []
-    many, have, said = f"of {len(stats.warnings)} trajectories", "has" if len(doubtful) == 1 else "have", list[str]()
-    for k in early[:1].tolist():
-        said.append(f"{len(early)} {many} stopped early: trajectory {k} {stats.message[k].removeprefix('stopped ')}")
-    for k in doubtful[:1]:
-        said.append(f"{len(doubtful)} {many} {have} a warning: trajectory {k}: {stats.warnings[k][0]}")
-    return said
+    have = "has" if len(doubtful) == 1 else "have"
+    stopped = [f"trajectory {k} {stats.message[k].removeprefix('stopped ')}" for k in early[:1].tolist()]
+    said = [f"trajectory {k}: {stats.warnings[k][0]}" for k in doubtful[:1]]
+    return [f"{len(early)} {many} stopped early: {text}" for text in stopped] + [
+        f"{len(doubtful)} {many} {have} a warning: {text}" for text in said
+    ]
 
 
 class Part:
-    """Results of trajectories first, first + 1, ..: rows (k, T, m), NaN after one has stopped, and their statistics.
-
-    columns: {name of `EnsembleStats`: of each}, and "happened", the events of each.
-    """
+    """Results of trajectories first, first + 1, ..: rows (k, T, m), columns of statistics, and "happened", events."""
 
     def __init__(self, first: int, rows: Array) -> None:
-        """Before the first step; rows: where they are to be."""
         self.first, self.rows = first, rows
         kinds = {**COLUMNS, "happened": np.object_}
         self.columns: dict[str, Any] = {name: np.zeros(len(rows), dtype=kind) for name, kind in kinds.items()}
@@ -129,9 +118,8 @@ class Part:
 class Ensemble:
     """Many motions of one model, as `simulate_many` gives them.
 
-    q[k] is what trajectory k alone would have, (T, nq), in one piece of memory, as in MuJoCo's rollout and a vmap. From
-    where a state of a trajectory was not finite on its rows are NaN. It keeps states alone: accelerations, and the
-    multipliers of constraints, are outputs of `forward_dynamics` at q[k], qd[k], see `arrays_at`.
+    q[k] is what trajectory k alone would have, (T, nq), in one piece of memory; NaN from a state on that is not finite.
+    Accelerations and multipliers of constraints are outputs of `forward_dynamics`, see `arrays_at`.
 
     Parameters
     ----------

@@ -54,36 +54,25 @@ def iterates(program: StepProgram) -> bool:
 
 
 def fits_lanes(program: StepProgram, options: RunOptions, grids: Sequence[EqualSteps], count: int) -> bool:
-    """Whether so many trajectories of a run without events go in lanes.
-
-    Others go one by one: few, which are sooner done; chosen steps that turn as often as numbers say, so that lanes
-    would wait for one another; with constraints, near whose flat positions a run is watched step by step; tolerances
-    below the rounding of a step, of which a warning tells; and more equal steps than there may be.
-    """
+    """Whether so many trajectories of a run without events go in lanes."""
     if not program.adaptive:
         return (count >= VECTOR or not iterates(program)) and sum([each.steps for each in grids]) <= options.max_steps
-    few = count < FEW_TRAJECTORIES
-    return not few and not iterates(program) and program.rows is None and options.relative >= program.finest
+    # With constraints a run is watched step by step, near flat positions; of tolerances below rounding it warns.
+    watched = program.rows is not None or options.relative < program.finest
+    return count >= FEW_TRAJECTORIES and not iterates(program) and not watched
 
 
 class Leg(NamedTuple):
-    """Part of runs up to the last of these marks of their clock, at these times.
+    """Part of runs up to the last of these marks of their clock."""
 
-    grid: the equal steps that begin with it, if any.  places: for each table of rows, which of them are at marks, and
-    at which.
-    """
-
-    grid: EqualSteps | None
+    grid: EqualSteps | None  # the equal steps that begin with it
     marks: Array
-    times: Array
-    places: list[tuple[slice, slice | Numbers]]
+    times: Array  # of marks
+    places: list[tuple[slice, slice | Numbers]]  # for each table of rows, which of them are at marks, and at which
 
 
 def equal_legs(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> Iterator[Leg]:
-    """The legs of runs that keep tables of rows, after so many steps each, (T,).
-
-    every: all steps are marks, so many of a leg; 0: those that the tables ask for, and the last of a grid.
-    """
+    """Legs of runs that keep tables of rows, after so many steps each, (T,). every: marks are all, so many a leg."""
     done, asked = 0, tables[0] if len(tables) == 1 else np.unique(np.concatenate(tables))
     for grid in grids:
         end = done + grid.steps
@@ -130,10 +119,7 @@ class LaneRun:
         stopped: Stopped,
         watch: Callable[[Array, Array], None] | None = None,
     ) -> LaneRuns:
-        """Go all legs. Raises StoppedError after `stopped`.
-
-        tables: receive states, (k, T, m), NaN from where a run has not come to.  watch: is told those of all marks.
-        """
+        """Go all legs, with states for tables (k, T, m), NaN from where a run stops on. watch: told those at marks."""
         program, m, steps, longest = self._program, self._program.size, 0, 0.0
         for rows in tables:
             rows[:, 0] = self._x  # unless that is not at the start

@@ -58,11 +58,10 @@ def simulate_many(
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
-    Trajectories run side by side, a vector of them at a time, in equal steps and in chosen ones. One by one, to the
-    same bits, go those with events, fewer than eight by a method that iterates, and in chosen steps fewer than 32,
-    those with constraints and those whose tolerance is below the rounding of a step. One whose state is not finite is
-    NaN from there on, `stats.message` and a `SimulationWarning` name the time and the coordinate, and the others go on.
-    Ctrl-C is a KeyboardInterrupt; a store keeps the chunks that are done, and the error says how many trajectories.
+    Trajectories run side by side, a vector of them at a time. One by one go all without machine code, those with
+    events, fewer than eight by a method that iterates, and in chosen steps fewer than 32, those with constraints and
+    those whose tolerance is below the rounding of a step. One whose state is not finite is NaN from there on,
+    `stats.message` and a `SimulationWarning` say when and why, and the others go on. Ctrl-C is a KeyboardInterrupt.
 
     Parameters
     ----------
@@ -77,42 +76,35 @@ def simulate_many(
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
         steps need it.
     events : Event or iterable of Event
-        Instants to look for on the way, as in `simulate`; trajectories then run one by one. One that an event ends is
-        NaN from there on, and `stats.status` is 1. Rows are at the same times as without.
+        As in `simulate`. A trajectory that one ends is NaN from there on, and its `stats.status` is 1.
     tau : float, array_like or callable
         Constant applied force [N m or N], for all velocities, for each, (n,), or for each trajectory too, (N, n); or a
-        controller in closed form, see `with_controller`. A `SampledController`, which may remember what it has seen, is
-        refused: it controls one run of `simulate`.
+        controller in closed form, see `with_controller`, but no `SampledController`.
     parameters : mapping, optional
-        {name: value} in place of the model's own, and of those of a controller, one for each trajectory, (N,), or a
-        number for all. A number is built into the machine code, and another one compiles anew: what changes from call
-        to call is an array (N,).
+        {name: value} in place of the model's own, and of those of a controller: for each trajectory, (N,), or a number
+        for all, which is built into the machine code, so that another one compiles anew.
     workers : int, Executor, callable or None
         How many threads share the work, None for one on each core; or an executor of `concurrent.futures`, such as
-        Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The numbers are the same to the last
-        bit.
+        Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The bits are the same.
     store : path, optional
-        A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
-        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder, which one
-        call at a time writes. A chunk that had not ended is lost.
+        A folder, empty or not there, in which chunks are kept as they end. The same call again goes on where the first
+        was ended, by whatever, and at last reads all from the folder, which one call at a time writes.
     **options
         Those of `dyn.Options` but `dense_output`; and `chunk`, how many trajectories a worker takes at a time: by
         default up to four chunks for each worker, of at most 4096 trajectories, fewer where they have many rows, and of
-        at most 256 one by one or with a `store`. Side by side it is rounded up to whole vectors, multiples of 8.
+        at most 256 one by one or with a `store`. Side by side it is rounded up to multiples of 8.
 
     Returns
     -------
     Ensemble
         t (T,), q (N, T, nq), qd (N, T, n), and `stats` with an entry for each trajectory. With a store q and qd are
-        memory maps of its file: what is read of them is loaded, and they cannot be written. With `form="momentum"` qd
-        are computed, and in memory.
+        memory maps of its file, which cannot be written; with `form="momentum"` qd are computed, and in memory.
 
     Raises
     ------
     TypeError, ValueError
         For arguments of another type, shape or range, each by name, for `workers` that give no results, and for a
-        `store` that keeps another sweep, by what differs: model, starts, parameters, options, versions; and for a
-        `store` that is damaged.
+        `store` that is damaged, or keeps another sweep, by what differs.
     MemoryError
         For a result that would not fit.
     OSError
@@ -204,53 +196,47 @@ def ends_of(task: Task, x: Array, p: Array, workers: Workers) -> Array:
 
 
 def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None = None) -> Part:
-    """Run the chunks, by whoever shares them, until all parts have come.
-
-    Those that a store has are taken from there, and others are kept there as they end.
-    Raises ValueError unless all parts come.
-    """
-    rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
-    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
-    if store is None and len(chunks) == 1 and isinstance(workers, int):
-        return task.run(chunks[0], rows, lambda: False)
-    whole, came = Part(0, rows), dict[int, int]()  # trajectories, by the first
+    """Run the chunks that a store has not, by whoever shares them. Raises ValueError unless all parts come."""
+    whole = Part(0, np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows)
+    left = {k: Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)}
+    if store is None and len(left) == 1 and isinstance(workers, int):
+        return task.run(left[0], whole.rows, lambda: False)
     if store is not None:
-        known = {chunk.first: part for chunk in chunks if (part := store.part(chunk)) is not None}
-        for part in known.values():
-            whole.place(part)
-            came[part.first] = len(part.rows)
-        chunks = [chunk for chunk in chunks if chunk.first not in known]
-        if chunks:
+        for known in [part for chunk in left.values() if (part := store.part(chunk)) is not None]:
+            whole.place(known)
+            del left[known.first]
+        if left:
             store.lock()
+
+    def done() -> int:
+        return len(x) - sum([len(chunk.x) for chunk in left.values()])
+
     try:
         with (
             Progress("simulate", len(x), task.options.progress) as report,
-            closing(finished(task, chunks, workers, whole.rows)) as parts,
+            closing(finished(task, [*left.values()], workers, whole.rows)) as parts,
         ):
             for part in parts:
                 whole.place(part)
                 if store is not None:
                     store.keep(part)
-                came[part.first] = len(part.rows)
-                report(sum(came.values()))
+                left.pop(part.first, None)
+                report(done())
     except KeyboardInterrupt:
         if store is None:
             raise
-        keeps = f"{store.name} keeps {sum(came.values())} of {len(x)} trajectories"
+        keeps = f"{store.name} keeps {done()} of {len(x)} trajectories"
         raise KeyboardInterrupt(f"{keeps}: the same call goes on") from None
-    if (done := sum(came.values())) != len(x):
-        back = f"of {len(x)} trajectories came back {done}"
+    if left:
+        back = f"of {len(x)} trajectories came back {done()}"
         raise ValueError(f"workers must give a result for each item, as map does: {back}")
     if store is not None:
-        whole.rows = store.read_only()
+        whole.rows.flags.writeable = False
     return whole
 
 
 def _require_room(options: RunOptions, many: int, m: int, *, stored: bool) -> None:
-    """Raises ValueError if trajectories would not have the same rows, MemoryError if all would not fit.
-
-    stored: in a file, not in memory.
-    """
+    """Raises ValueError if trajectories would not have the same rows, MemoryError if all would not fit."""
     if options.times is None and options.adaptive:
         raise ValueError(
             f"{options.method!r} chooses the steps of each trajectory: t_eval must say which times to record, "

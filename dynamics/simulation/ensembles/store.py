@@ -7,6 +7,7 @@ import math
 import os
 import platform
 import shutil
+from dataclasses import fields
 from hashlib import blake2b
 from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
@@ -34,18 +35,14 @@ GIB = 2**30
 class Store:
     """The folder of a sweep.
 
-    sweep.json: what the sweep is, see `sweep_of`, and how many trajectories are in a chunk.  rows.npy: the states
-    (N, T, m) of all, in place.  chunk-000000000.json, ..: how the trajectories from that number on went and the
-    checksum of their rows, a file each, which is there once their rows are.  lock.sqlite: what one call at a time
-    holds, see `lock`; it has nothing in it.
-
-    name: of the store, in sentences.  width: trajectories in a chunk, as the sweep began.  rows: the table, written
-    through to the file.
+    sweep.json: what the sweep is, and how many trajectories are in a chunk.  rows.npy: the states (N, T, m) of all.
+    chunk-000000000.json, ..: how the trajectories from that number on went and the checksum of their rows, written once
+    these are.  lock.sqlite: empty, what one call at a time holds.
     """
 
     def __init__(self, folder: Path, sweep: dict[str, Json], width: int, shape: tuple[int, ...]) -> None:
         """Open the folder, or begin it. Raises ValueError where it keeps something else, OSError where it cannot be."""
-        self._folder, self.name, self.width = folder, f"store {str(folder)!r}", width
+        self._folder, self.name = folder, f"store {str(folder)!r}"
         self._lock: sqlite3.Connection | None = None
         folder.mkdir(parents=True, exist_ok=True)
         try:
@@ -71,11 +68,8 @@ class Store:
             raise
 
     def lock(self) -> None:
-        """Take the folder for this call alone, until `close` or the end of the process, however that ends.
-
-        SQLite's lock does that on every system. Raises OSError where another call has taken it.
-        """
-        import sqlite3  # for what is written alone
+        """Take the folder for this call alone, until `close` or the process ends. Raises OSError if it is taken."""
+        import sqlite3  # whose lock does that on every system
 
         if self._lock is not None:
             return
@@ -110,16 +104,11 @@ class Store:
 
     def keep(self, part: Part) -> None:
         """Write how the trajectories of a part went; their rows are in the table."""
-        self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
+        self.rows.flush()
         kept = {name: values.tolist() for name, values in part.columns.items()}
         kept["happened"] = [[(number, t, x.tolist()) for number, t, x in log] for log in kept["happened"]]
         checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
         atomic_write(self._file(part.first), json.dumps({**kept, "checksum": checksum}))
-
-    def read_only(self) -> Array:
-        """The table, of which rows are read when they are asked for, and none can be written."""
-        table: Array = np.load(self._folder / ROWS, mmap_mode="r")
-        return table
 
     def _file(self, first: int) -> Path:
         return self._folder / f"chunk-{first:09d}.json"
@@ -136,7 +125,7 @@ class Store:
             raise ValueError(f"{self.name} is damaged: its {SWEEP} is not one that was written here")
         return known
 
-    def _table(self, shape: tuple[int, ...]) -> Array:
+    def _table(self, shape: tuple[int, ...]) -> np.memmap[Any, np.dtype[np.float64]]:
         """The table, in its file. Raises ValueError for a file that was cut: a memory map would fill it with zeros."""
         path, header, damaged = self._folder / ROWS, BytesIO(), f"{self.name} is damaged: "
         described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
@@ -152,8 +141,7 @@ class Store:
         with path.open("rb") as file:
             if file.read(header.tell()) != header.getvalue():
                 raise ValueError(f"{damaged}its {ROWS} is no table of NumPy of shape {shape}; {again}")
-        table: Array = np.load(path, mmap_mode="r+")
-        return table
+        return np.memmap(path, np.float64, "r+", header.tell(), shape)
 
     def _make_rows(self, header: bytes, size: int, shape: tuple[int, ...]) -> None:
         """Make the file of the table, with all its room."""
@@ -175,10 +163,7 @@ class Store:
 
 
 def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json]:
-    """What makes a sweep the sweep that it is: equations, starts, parameters, options, and by which versions.
-
-    x, p: states (N, m) and parameters (N, ..) that the steps start from.
-    """
+    """What makes a sweep of states x (N, m) with parameters p (N, ..): equations, options, and by which versions."""
     program, options, watched = task.program, task.options, task.events.events if task.events else ()
     model = [problem.rate, problem.velocities, program.normalization]
     events = [graph for event in watched for graph in (event.values, event.reset)]
@@ -191,12 +176,10 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "cgraph": cg.__version__,
         "llvmlite": llvmlite,
         "machine": platform.machine(),
-        **{name: getattr(options, name) for name in ("method", "backend", "fma", "estimate_error")},
-        **{name: getattr(options, name) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
-        "max_steps": None if options.max_steps == math.inf else options.max_steps,
+        **{field.name: getattr(options, field.name) for field in fields(options) if field.name != "progress"},
         "rtol": options.relative,
-        "atol": np.asarray(options.absolute, dtype=np.float64).tolist(),
-        "times": _digest(options.row_times.tobytes()),
+        "atol": np.asarray(options.absolute).tolist(),
+        "t_eval": _digest(options.row_times.tobytes()),
         "states": program.components,
         "varied": problem.parameters,
         "events": [f"{event.name} {event.direction} {event.terminal}" for event in watched],

@@ -26,16 +26,14 @@ ROUNDINGS = 8.0  # that the interpolation of a state, and the sum of a motion, m
 class Event(HoldsNodes):
     """Event: a quantity that passes through zero, and what happens there.
 
-    A quantity that touches zero and turns back counts too, with direction 0, where its extremum is zero to the rounding
-    of its evaluation. One that stays zero for a while has one event, where it arrives; one that starts there has none
-    before it comes back, but for one with a reset and a direction, a contact: it happens there if it closes. Of events
-    at one instant those without a reset are first; then one reset follows another, the first in the list that is due
-    after the last: what is zero and moves in its direction. What another reset has turned back is not; contacts that
-    rest are, once another reset closes them. A jump by a reset is no crossing.
+    A quantity that touches zero and turns back counts too, with direction 0, where its extremum is zero to rounding.
+    One that stays zero for a while has one event, where it arrives; one that starts there has none before it comes
+    back, but for one with a reset and a direction, a contact: it happens there if it closes. Of events at one instant
+    those without a reset are first; then the first reset in the list that is due, again and again: what is zero and
+    moves in its direction. A jump by a reset is no crossing.
 
-    Value and slope of the quantity are looked at sixteen times in each step, and as often more as it takes until the
-    cubics between looks agree with them, at most 1024 times. Where that is too few, `Stats.warnings` says so: limit the
-    steps by `max_step` or `dt`.
+    The quantity is looked at 16 to 1024 times in each step, until cubics between looks agree. Where that is too few,
+    `Stats.warnings` says so: limit the steps by `max_step` or `dt`.
 
     Parameters
     ----------
@@ -51,10 +49,9 @@ class Event(HoldsNodes):
     reset : callable, optional
         The state from which the run goes on, reset(q, qd, t) or reset(q, qd, t, p) -> (q, qd) as nodes or numbers; of
         an OdeSystem reset(x, t) or reset(x, t, p) -> x. Quaternions in q are brought to length 1. Both states are rows
-        of the trajectory, at the same instant, the first and the last of several resets there; at a time of `t_eval`,
-        the one before is. Where they follow one another in no time, as the bounces of a ball that comes to rest do, the
-        run stops and says so. Without a direction, a reset that starts at zero does not know its side: how it leaves
-        from there by itself resets nothing, and a warning says so.
+        of the trajectory, the first and the last of several resets at an instant; at a time of `t_eval`, the one before
+        is. A run whose resets follow one another in no time stops and says so. Without a direction, a reset that starts
+        at zero does not know its side: how it leaves from there resets nothing, and a warning says so.
 
     Raises
     ------
@@ -115,18 +112,14 @@ def as_events(events: Event | Iterable[Event]) -> tuple[Event, ...]:
 
 @dataclass(frozen=True, eq=False)
 class WatchedEvent:
-    """Event as its location reads it, with its quantity g over the states x, t and parameters p as graphs.
-
-    values: g.  slopes: g_dot, with the tangents of x and t for inputs besides.  errors: a bound of the rounding of g,
-    with the errors of x and t for inputs besides.  reset: the state after it, if it changes.
-    """
+    """Event as graphs over states x, t and parameters p: of its quantity g, and of the state after it."""
 
     name: str
     direction: int
     terminal: bool
     values: Graph
-    slopes: Graph
-    errors: Graph
+    slopes: Graph  # of g, with the tangents of x and t for inputs besides
+    errors: Graph  # a bound of the rounding of g, with the errors of x and t for inputs besides
     reset: Graph | None
 
     def counts(self, side: float, *, touching: bool = False) -> bool:
@@ -198,10 +191,7 @@ def _reset(problem: Problem, what: str, function: Callable[..., Any]) -> Graph:
 
 
 def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
-    """The outputs' rounding, to first order, from errors of the inputs: a running bound, node by node.
-
-    An error passes on through the local partials, in absolute value, and each operation adds its own.
-    """
+    """The outputs' rounding, to first order, from errors of the inputs, node by node: |partials| times errors."""
     leaves, zero = new_variables("error", len(inputs), graph.input_names), cg.constant(0.0)
     errors: dict[Node, Node] = dict(zip(inputs, leaves, strict=True))
     with building(Builder()):

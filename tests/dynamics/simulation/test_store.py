@@ -132,7 +132,7 @@ OTHERS: list[tuple[str, dict[str, Any]]] = [
     ("rtol is 1e-09, here 1e-08", {"rtol": 1e-8}),
     ("atol", {"atol": [1e-10, 1e-9]}),
     ("method is 'dop853', here 'dopri5'", {"method": "dopri5"}),
-    ("times", {"t_eval": [0.1, 0.15]}),
+    ("t_eval", {"t_eval": [0.1, 0.15]}),
     ("max_step", {"max_step": 0.1}),
     ("parameters", {"k": [1.0, 3.0]}),
     ("trajectories is 2, here 3", {"k": [1.0, 2.0, 3.0]}),
