@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -47,11 +48,8 @@ class Store:
         folder.mkdir(parents=True, exist_ok=True)
         try:
             known = self._known()
-            left_over = list(folder.glob(".*.tmp"))  # of files that a process was writing when it was ended
-            if left_over or not known or not all(self._file(k).exists() for k in range(0, shape[0], known["chunk"])):
+            if not known or not all(self._file(k).exists() for k in range(0, shape[0], known["chunk"])):
                 self.lock()  # else the folder is read alone
-                for path in left_over:
-                    path.unlink(missing_ok=True)
                 known = self._known()
             if not known:
                 if any(path.name != LOCK for path in folder.iterdir()):
@@ -83,6 +81,8 @@ class Store:
                 raise OSError(f"{self.name} cannot be locked: {error}") from None
             other = "another call of simulate_many, here or in another process"
             raise OSError(f"{self.name} is being written by {other}: wait for it, or name another folder") from None
+        for path in self._folder.glob(".*.tmp"):  # what a process was writing when it was ended
+            path.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Leave the folder to others."""
@@ -115,42 +115,35 @@ class Store:
 
     def _known(self) -> dict[str, Any]:
         """What the folder keeps; empty if nothing."""
+        path = self._folder / SWEEP
         try:
-            known = json.loads((self._folder / SWEEP).read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return {}
-        except ValueError:
-            known = None
-        if not isinstance(known, dict) or not isinstance(known.get("chunk"), int):
-            raise ValueError(f"{self.name} is damaged: its {SWEEP} is not one that was written here")
-        return known
+            known: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+            return {**known, "chunk": int(known["chunk"])} if known else {}
+        except (ValueError, KeyError, TypeError):
+            raise ValueError(f"{self.name} is damaged: its {SWEEP} is not one that was written here") from None
 
     def _table(self, shape: tuple[int, ...]) -> np.memmap[Any, np.dtype[np.float64]]:
         """The table, in its file. Raises ValueError for a file that was cut: a memory map would fill it with zeros."""
         path, header, damaged = self._folder / ROWS, BytesIO(), f"{self.name} is damaged: "
         described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(header, described)
-        expected = header.tell() + 8 * math.prod(shape)
+        size = header.tell() + 8 * math.prod(shape)
         if not path.exists():
             if any(self._folder.glob("chunk-*")):
                 raise ValueError(f"{damaged}it has results of chunks, and no {ROWS}")
-            self._make_rows(header.getvalue(), expected, shape)
-        again = "remove the folder, and the sweep begins anew"
-        if (size := path.stat().st_size) != expected:
-            raise ValueError(f"{damaged}its {ROWS} has {size} bytes, not {expected}; {again}")
+            self._make_rows(header.getvalue(), size)
         with path.open("rb") as file:
-            if file.read(header.tell()) != header.getvalue():
-                raise ValueError(f"{damaged}its {ROWS} is no table of NumPy of shape {shape}; {again}")
+            if path.stat().st_size != size or file.read(header.tell()) != header.getvalue():
+                here = f"its {ROWS} of {path.stat().st_size} bytes is no table of NumPy of {shape}, of {size} bytes"
+                raise ValueError(f"{damaged}{here}; remove the folder, and the sweep begins anew")
         return np.memmap(path, np.float64, "r+", header.tell(), shape)
 
-    def _make_rows(self, header: bytes, size: int, shape: tuple[int, ...]) -> None:
-        """Make the file of the table, with all its room."""
-        what, free = f"{self.name} needs {size / GIB:.3g} GiB for", shutil.disk_usage(self._folder).free
-        if size > free:  # a write through a memory map would end the process
-            needed = f"{shape[0]} trajectories of {shape[1]} rows of {shape[2]} numbers"
-            raise OSError(f"{what} {needed}, and {free / GIB:.3g} GiB are free: record fewer times (t_eval)")
-        made = self._folder / f".{ROWS}.{os.getpid()}.tmp"
+    def _make_rows(self, header: bytes, size: int) -> None:
+        """Make the file of the table, with all its room: a write through a memory map without would end the process."""
+        made, free = self._folder / f".{ROWS}.{os.getpid()}.tmp", shutil.disk_usage(self._folder).free
         try:
+            if size > free:
+                raise OSError(errno.ENOSPC, f"{free / GIB:.3g} GiB are free")
             with made.open("wb") as file:
                 file.write(header)
                 file.truncate(size)
@@ -158,7 +151,8 @@ class Store:
                     os.posix_fallocate(file.fileno(), 0, size)
         except OSError as error:
             made.unlink(missing_ok=True)
-            raise OSError(error.errno, f"{what} a {ROWS}, which cannot be made: {error.strerror}") from None
+            needs = f"{self.name} needs {size / GIB:.3g} GiB for its {ROWS}, fewer with fewer times (t_eval)"
+            raise OSError(error.errno, f"{needs}: {error.strerror}") from None
         made.replace(self._folder / ROWS)
 
 

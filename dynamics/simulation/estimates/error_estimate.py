@@ -137,12 +137,7 @@ class Watch:
 
 
 def error_estimates(
-    program: StepProgram,
-    options: RunOptions,
-    beside: RunsBeside,
-    watch: Watch,
-    steps: int,
-    rows: Sequence[Array],
+    program: StepProgram, options: RunOptions, beside: RunsBeside, watch: Watch, steps: int, rows: Sequence[Array]
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 

@@ -167,10 +167,10 @@ def test_a_folder_of_something_else_or_damaged_is_a_sentence(tmp_path: Path) -> 
     assert not unfinished.exists()  # what a process that was killed was writing
     for cut in (len(bits) - 8, 130, 0):
         os.truncate(rows, cut)
-        with pytest.raises(ValueError, match=rf"sweep' is damaged: its rows\.npy has {cut} bytes, not {len(bits)}; "):
+        with pytest.raises(ValueError, match=rf"sweep' is damaged: its rows\.npy of {cut} bytes is .*of {len(bits)} b"):
             springs(store, [1.0, 2.0])
     rows.write_bytes(bytes(len(bits)))
-    with pytest.raises(ValueError, match=r"is damaged: its rows\.npy is no table of NumPy"):
+    with pytest.raises(ValueError, match=r"is damaged: its rows\.npy of \d+ bytes is no table of NumPy"):
         springs(store, [1.0, 2.0])
     rows.unlink()
     with pytest.raises(ValueError, match=r"is damaged: it has results of chunks, and no rows\.npy"):
@@ -184,8 +184,8 @@ def test_a_folder_of_something_else_or_damaged_is_a_sentence(tmp_path: Path) -> 
 
 def test_a_store_that_has_no_room_is_a_sentence(tmp_path: Path) -> None:
     full = patch("shutil.disk_usage", return_value=SimpleNamespace(free=0))
-    with full, pytest.raises(OSError, match="GiB for 2 trajectories of 2 rows of 2 numbers, and 0 GiB are free"):
+    with full, pytest.raises(OSError, match=r"needs .* GiB for its rows\.npy, .*: 0 GiB are free"):
         springs(tmp_path, [1.0, 2.0])
     large = patch("os.posix_fallocate", create=True, side_effect=OSError(27, "File too large"))
-    with large, pytest.raises(OSError, match=rf"store '{tmp_path}' needs .* GiB for a rows\.npy, .*: File too large"):
+    with large, pytest.raises(OSError, match=rf"store '{tmp_path}' needs .* GiB for its rows\.npy, .*: File too large"):
         springs(tmp_path, [1.0, 2.0])
