@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
@@ -65,39 +65,27 @@ def fits_lanes(program: StepProgram, options: RunOptions, grids: Sequence[EqualS
 class Leg(NamedTuple):
     """Part of runs up to the last of these marks of their clock."""
 
-    grid: EqualSteps | None  # the equal steps that begin with it
+    grid: EqualSteps | None  # the equal steps that it is
     marks: Array
-    times: Array  # of marks
-    places: list[tuple[slice, slice | Numbers]]  # for each table of rows, which of them are at marks, and at which
+    here: slice  # of the rows that are states at marks
 
 
-def equal_legs(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> Iterator[Leg]:
-    """Legs of runs that keep tables of rows, after so many steps each, (T,). every: marks are all, so many a leg."""
-    done, asked = 0, tables[0] if len(tables) == 1 else np.unique(np.concatenate(tables))
+def equal_legs(grids: Sequence[EqualSteps], numbers: Numbers) -> list[Leg]:
+    """The legs of runs whose rows are states after so many steps each, (T,)."""
+    legs, done = list[Leg](), 0
     for grid in grids:
-        end = done + grid.steps
-        marks = asked[slice(*asked.searchsorted((done + 1, end + 1)))]
-        marks = marks if len(marks) and marks[-1] == end else np.append(marks, end)
-        all_steps = (np.arange(k, min(k + every, end + 1)) for k in range(done + 1, end + 1, every or end))
-        for number, part in enumerate(all_steps if every else [marks]):
-            here = [slice(*numbers.searchsorted((part[0], part[-1] + 1)).tolist()) for numbers in tables]
-            there = [_together(part.searchsorted(numbers[rows])) for numbers, rows in zip(tables, here, strict=True)]
-            steps = np.array(part - done, dtype=np.float64)
-            times = grid.begin + steps * grid.h
-            yield Leg(None if number else grid, steps, times, list(zip(here, there, strict=True)))
-        done = end
-
-
-def _together(at: Numbers) -> slice | Numbers:
-    """Indices as a slice, which copies nothing, if they follow one another."""
-    return slice(int(at[0]), int(at[-1]) + 1) if len(at) and at[-1] - at[0] == len(at) - 1 else at
+        here = slice(*numbers.searchsorted((done + 1, done + grid.steps + 1)).tolist())
+        marks = numbers[here] - done
+        marks = marks if len(marks) and marks[-1] == grid.steps else np.append(marks, grid.steps)
+        legs.append(Leg(grid, marks.astype(np.float64), here))
+        done += grid.steps
+    return legs
 
 
 def chosen_legs(options: RunOptions) -> list[Leg]:
     """The only leg of runs by chosen steps."""
     first = int(options.row_times[0] == options.t0)  # the first row that a step makes
-    times = options.row_times[first:]
-    return [Leg(None, options.direction * times, times, [(slice(first, None), slice(None))])]
+    return [Leg(None, options.direction * options.row_times[first:], slice(first, len(options.row_times)))]
 
 
 class LaneRun:
@@ -112,29 +100,20 @@ class LaneRun:
             self._set(beginning(options, max(options.relative, program.finest)) | over(options.t0, options.t_end))
             self._set({TOLERANCE: tolerance(options), "lanes.toward": options.direction})
 
-    def to_end(
-        self,
-        legs: Iterable[Leg],
-        tables: Sequence[Array],
-        stopped: Stopped,
-        watch: Callable[[Array, Array], None] | None = None,
-    ) -> LaneRuns:
-        """Go all legs, with states for tables (k, T, m), NaN from where a run stops on. watch: told those at marks."""
+    def to_end(self, legs: Sequence[Leg], rows: Array, stopped: Stopped) -> LaneRuns:
+        """Go all legs, with states for rows (k, T, m), NaN from where a run stops on."""
         program, m, steps, longest = self._program, self._program.size, 0, 0.0
-        for rows in tables:
-            rows[:, 0] = self._x  # unless that is not at the start
-        for grid, marks, times, places in legs:
+        rows[:, 0] = self._x  # unless that is not at the start
+        for grid, marks, here in legs:
             if grid is not None:
                 self._set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
                 self._passes[:, 0], steps, longest = 0, steps + grid.steps, max(longest, abs(grid.h))
             made = self._rows(marks, stopped)
+            times = self._options.direction * marks
             block = _states(program, made, times) if program.adaptive else made[:, :, 1 : 1 + m]
             if (self._passes[:, 1] < len(marks)).any():
                 block[np.arange(len(marks)) >= self._passes[:, 1:]] = np.nan
-            for (here, there), rows in zip(places, tables, strict=True):
-                rows[:, here] = block[:, there]
-            if watch is not None:
-                watch(times, block)
+            rows[:, here] = block[:, : here.stop - here.start]
         if not program.adaptive:
             columns = {"steps": np.full(len(self._x), steps), "dt": np.full(len(self._x), longest)}
             return self._read("nonfinite") == 0.0, {**columns, "nfev": self._read("evaluations")}

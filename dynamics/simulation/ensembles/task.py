@@ -14,12 +14,12 @@ import numpy as np
 
 from cgraph._shared import Array, thread_count
 
-from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates, runs_beside
+from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates, runs_beside, unresolved
 from ..events.event import EventProgram
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..stepper import ChosenStepper, Stepper, stepper
-from ..steps.equal_steps import EqualSteps, Numbers, even_steps
+from ..steps.equal_steps import EqualSteps, Numbers, even_steps, instants_of
 from ..steps.step_program import StepProgram, compile_steps
 from .ensemble import COLUMNS, Part
 from .lanes import VECTOR, LaneRun, LaneRuns, Leg, Stopped, chosen_legs, equal_legs, fits_lanes, lanes_of
@@ -50,16 +50,25 @@ class Task:
     ) -> None:
         """many: trajectories, of all chunks."""
         self.program, self.options, self.events, self._many = program, options, events, many
-        self._grids: list[EqualSteps] = []
-        if not program.adaptive:
-            self._grids, self._numbers = even_steps(options.instants, options.step)
-        self._beside: RunsBeside | None = None
         self.count = len(options.row_times)  # rows of a trajectory
         self.largest = 0  # trajectories in a chunk at most, if they go in lanes
+        self._grids, self._all_steps = list[EqualSteps](), False
+        self._beside: RunsBeside | None = None
+        if not program.adaptive:
+            self._grids, numbers = even_steps(options.instants, options.step)
+            first = 0 if options.times is None else int(options.times[0] != options.t0)
+            self._at_rows = np.arange(self.count) if options.times is None else numbers[first : first + self.count]
         if events is None and fits_lanes(program, options, self._grids, many):
-            self._beside = runs_beside(self._grids, program.order) if options.estimated else None
-            rows = self.count if self._beside is None else self.count + len(self._beside.t)
+            rows = self.count
+            if options.estimated:
+                self._beside = runs_beside(self._grids, program.order)
+                self._all_steps = unresolved(program.rate)[0] is not None  # are looked at
+                rows = self._steps + 1 if self._all_steps else rows + len(self._beside.t)
             self.largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // (program.steps.width * rows)))
+
+    @property
+    def _steps(self) -> int:
+        return sum([grid.steps for grid in self._grids])
 
     def width(self, chunk: int | None, workers: Team, *, stored: bool = False) -> int:
         """Trajectories in a chunk: as asked for, or the shares of workers; in lanes whole vectors."""
@@ -88,40 +97,39 @@ class Task:
 
     def run_lanes(self, x: Array, p: Array, rows: Array, stopped: Stopped) -> LaneRuns | None:
         """Run states x (k, m) with parameters p (k, ..) in lanes, into rows (k, T, m); None if they do not go there."""
-        program, options, beside = self.program, self.options, self._beside
+        program, options = self.program, self.options
         with _lock:
             lanes = lanes_of(program, options.backend, options.fma) if self.largest else None
         if lanes is None:
             return None
         (own, *others), run = self._legs, LaneRun(lanes, program, options, x, p)
-        if beside is None:
-            return run.to_end(own, [rows], stopped)
-        watch = Watch(program.rate, p, options.t0, x)
-        if watch.needed:  # which sees all steps, so many at once
-            own = equal_legs(self._grids, self._tables, max(1, ROWS // (len(x) * program.steps.width)))
-        states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
-        whole, columns = run.to_end(own, [rows, states[0]], stopped, watch.add)
+        if self._beside is None:
+            return run.to_end(own, rows, stopped)
+        beside, numbers, watch = self._beside, self._numbers, Watch(program.rate, p, options.t0, x)
+        states = [np.empty((len(x), len(each), x.shape[1])) for each in numbers]
+        whole, columns = run.to_end(own, states[0], stopped)
         for legs, each in zip(others, states[1:], strict=True):
-            LaneRun(lanes, program, options, x * ASIDE, p).to_end(legs, [each], stopped)
-        steps = int(columns["steps"][0])
-        return whole, columns | error_estimates(program, options, beside, watch, steps, [*states])
+            LaneRun(lanes, program, options, x * ASIDE, p).to_end(legs, each, stopped)
+        watch.add(instants_of(self._grids, numbers[0][1:]), states[0][:, 1:])
+        rows[:] = states[0][:, numbers[0].searchsorted(self._at_rows)]
+        states[0] = states[0][:, numbers[0].searchsorted(beside.numbers)]
+        return whole, columns | error_estimates(program, options, beside, watch, self._steps, states)
 
     @cached_property
-    def _tables(self) -> list[Numbers]:
-        """How many equal steps are done at the rows, and when runs are looked at to be compared."""
-        times, numbers = self.options.times, self._numbers
-        first = 0 if times is None else int(times[0] != self.options.t0)
-        rows = np.arange(numbers[-1] + 1) if times is None else numbers[first : first + len(times)]
-        return [rows, *([] if self._beside is None else [self._beside.numbers])]
+    def _numbers(self) -> list[Numbers]:
+        """How many equal steps of the runs, and of those beside, are done when they are looked at."""
+        if self._beside is None:
+            return [self._at_rows]
+        own = np.arange(self._steps + 1) if self._all_steps else np.union1d(self._at_rows, self._beside.numbers)
+        return [own, *[numbers for _, numbers in self._beside.runs]]
 
     @cached_property
-    def _legs(self) -> list[Iterable[Leg]]:
+    def _legs(self) -> list[list[Leg]]:
         """Legs of the runs, and of those beside."""
         if self.program.adaptive:
             return [chosen_legs(self.options)]
-        beside = [] if self._beside is None else self._beside.runs
-        runs = [(self._grids, self._tables), *[(stretches, [numbers]) for stretches, numbers in beside]]
-        return [list(equal_legs(stretches, tables)) for stretches, tables in runs]
+        beside = [] if self._beside is None else [stretches for stretches, _ in self._beside.runs]
+        return [equal_legs(*each) for each in zip([self._grids, *beside], self._numbers, strict=True)]
 
     def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Stopped) -> None:
         """Run these, each alone."""
