@@ -195,17 +195,15 @@ class Ensemble:
         except ImportError:
             raise ImportError(f"this table needs xarray: {install('tables')}") from None
         stats, by_time, of_start = self.stats, ("trajectory", "t"), ("trajectory",)
+        texts = {"message": stats.message, "warnings": ["; ".join(said) for said in stats.warnings]}
+        variables: dict[str, Any] = {
+            name: (of_start, np.array(texts.get(name, getattr(stats, name)))) for name in COLUMNS
+        }
         columns = {"q": ("coordinate", self.q, self.q_start), "qd": ("velocity", self.qd, self.qd_start)}
-        variables: dict[str, Any] = {}
         for name, (dimension, rows, start) in columns.items():
-            variables[name] = ((*by_time, dimension), rows)
-            variables[f"{name}_start"] = ((*of_start, dimension), start)
+            variables |= {name: ((*by_time, dimension), rows), f"{name}_start": ((*of_start, dimension), start)}
         if self.p is not None:
             variables["p"] = ((*by_time, "velocity"), self.p)
-        for name in ("steps", "rejected", "nfev", "dt", "success", "status", "error", "error_at_end"):
-            variables[name] = (of_start, getattr(stats, name))
-        variables["message"] = (of_start, np.array(stats.message))
-        variables["warnings"] = (of_start, np.array(["; ".join(said) for said in stats.warnings]))
         if shared := sorted({"trajectory", "t", "coordinate", "velocity", *variables} & {*self.parameters}):
             raise ValueError(f"the parameter {shared[0]!r} has the name of a column of the table: give it another name")
         coordinates = {

@@ -82,12 +82,6 @@ def equal_legs(grids: Sequence[EqualSteps], numbers: Numbers) -> list[Leg]:
     return legs
 
 
-def chosen_legs(options: RunOptions) -> list[Leg]:
-    """The only leg of runs by chosen steps."""
-    first = int(options.row_times[0] == options.t0)  # the first row that a step makes
-    return [Leg(None, options.direction * options.row_times[first:], slice(first, len(options.row_times)))]
-
-
 class LaneRun:
     """k runs in lanes, from states x (k, m) with parameters p (k, ..)."""
 

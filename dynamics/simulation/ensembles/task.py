@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from concurrent.futures import FIRST_COMPLETED, Executor, ThreadPoolExecutor, wait
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from ..stepper import ChosenStepper, Stepper, stepper
 from ..steps.equal_steps import EqualSteps, Numbers, even_steps, instants_of
 from ..steps.step_program import StepProgram, compile_steps
 from .ensemble import COLUMNS, Part
-from .lanes import VECTOR, LaneRun, LaneRuns, Leg, Stopped, chosen_legs, equal_legs, fits_lanes, lanes_of
+from .lanes import VECTOR, LaneRun, LaneRuns, Leg, Stopped, equal_legs, fits_lanes, lanes_of
 
 LARGEST_CHUNK = 256  # trajectories in a chunk one by one or of a store, unless asked for
 LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
@@ -33,8 +32,7 @@ SHARES = 4  # chunks for each worker, so that workers of unlike speed finish tog
 LOOK = 0.1  # s: not every system interrupts a wait without an end for Ctrl-C
 
 
-@dataclass(frozen=True)
-class Chunk:
+class Chunk(NamedTuple):
     """Trajectories first, first + 1, ..: their starts x (k, m) and the values p (k, ..) of the problem's parameters."""
 
     first: int
@@ -48,16 +46,16 @@ class Task:
     def __init__(
         self, program: StepProgram, options: RunOptions, many: int, events: EventProgram | None = None
     ) -> None:
-        """many: trajectories, of all chunks."""
         self.program, self.options, self.events, self._many = program, options, events, many
         self.count = len(options.row_times)  # rows of a trajectory
         self.largest = 0  # trajectories in a chunk at most, if they go in lanes
-        self._grids, self._all_steps = list[EqualSteps](), False
+        self._grids, self._all_steps, self._steps = list[EqualSteps](), False, 0
         self._beside: RunsBeside | None = None
         if not program.adaptive:
             self._grids, numbers = even_steps(options.instants, options.step)
             first = 0 if options.times is None else int(options.times[0] != options.t0)
             self._at_rows = np.arange(self.count) if options.times is None else numbers[first : first + self.count]
+            self._steps = int(numbers[-1])
         if events is None and fits_lanes(program, options, self._grids, many):
             rows = self.count
             if options.estimated:
@@ -66,14 +64,10 @@ class Task:
                 rows = self._steps + 1 if self._all_steps else rows + len(self._beside.t)
             self.largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // (program.steps.width * rows)))
 
-    @property
-    def _steps(self) -> int:
-        return sum([grid.steps for grid in self._grids])
-
     def width(self, chunk: int | None, workers: Team, *, stored: bool = False) -> int:
         """Trajectories in a chunk: as asked for, or the shares of workers; in lanes whole vectors."""
         if chunk is None:
-            shares = 1 if self._grids and self._many * self._grids[0].steps <= SHORT else SHARES
+            shares = 1 if 0 < self._many * self._steps <= SHORT else SHARES
             shares *= workers if isinstance(workers, int) else UNKNOWN
             most = LARGEST_CHUNK if stored or not self.largest else self.largest
             chunk = min(math.ceil(self._many / shares), most)
@@ -127,7 +121,8 @@ class Task:
     def _legs(self) -> list[list[Leg]]:
         """Legs of the runs, and of those beside."""
         if self.program.adaptive:
-            return [chosen_legs(self.options)]
+            options, first = self.options, int(self.options.row_times[0] == self.options.t0)  # that a step makes
+            return [[Leg(None, options.direction * options.row_times[first:], slice(first, self.count))]]
         beside = [] if self._beside is None else [stretches for stretches, _ in self._beside.runs]
         return [equal_legs(*each) for each in zip([self._grids, *beside], self._numbers, strict=True)]
 
@@ -179,43 +174,29 @@ def checked(workers: Workers) -> Team:
 
 
 def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -> Generator[Part, None, None]:
-    """The parts as they come, in any order; closing it, or an exception, ends the threads.
+    """The parts as they come, in any order; closing it, or an exception, ends the threads, which fill the table."""
+    stop = threading.Event()
 
-    table: (N, T, m), in which threads make the rows. Raises TypeError for a map that gives something else than results,
-    RuntimeError for a process that was ended.
-    """
-    if isinstance(workers, int):
-        stop = threading.Event()
+    def run(chunk: Chunk) -> Part:
+        return task.run(chunk, table[chunk.first : chunk.first + len(chunk.x)], stop.is_set)
 
-        def run(chunk: Chunk) -> Part:
-            return task.run(chunk, table[chunk.first : chunk.first + len(chunk.x)], stop.is_set)
-
-        if workers == 1:
-            yield from map(run, chunks)
-            return
+    if workers == 1:
+        yield from map(run, chunks)
+    elif isinstance(workers, int):
         with ThreadPoolExecutor(min(workers, len(chunks))) as pool:  # which waits for its threads at any exit
             try:
                 yield from _by_executor(pool, run, chunks)
             finally:
                 stop.set()
-        return
-    done = 0
-    executor: object = workers if isinstance(workers, Executor) else getattr(workers, "__self__", None)
-    try:
-        if isinstance(executor, Executor):
-            results: object = _by_executor(executor, task, chunks)
-        elif callable(workers):
-            results = workers(task, chunks)
+    elif isinstance(executor := getattr(workers, "__self__", workers), Executor):  # also by its own map
+        yield from _by_executor(executor, task, chunks)
+    elif callable(workers):
+        results: object = workers(task, chunks)
         for part in results if isinstance(results, Iterable) else [results]:
             if not isinstance(part, Part):
                 got = f"{type(part).__name__}: {part!r:.60}"
                 raise TypeError(f"workers must give the results of the function, as map does, got {got}")
             yield part
-            done += 1
-    except BrokenExecutor:
-        came = f"{done} of {len(chunks)} chunks were here"
-        ended = f"a process of workers was ended from outside, as where memory runs out, when {came}"
-        raise RuntimeError(ended) from None
 
 
 def _by_executor(pool: Executor, run: Callable[[Chunk], Part], chunks: Sequence[Chunk]) -> Generator[Part, None, None]:

@@ -79,7 +79,8 @@ class Event(HoldsNodes):
     reset: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not _is_function(self.value) or not isinstance(self.terminal, bool):
+        is_function = [callable(each) and not isinstance(each, type) for each in (self.value, self.reset)]
+        if not isinstance(self.name, str) or not is_function[0] or not isinstance(self.terminal, bool):
             raise TypeError(
                 "an event needs a name, a function, and True or False for `terminal`, got "
                 f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
@@ -87,26 +88,20 @@ class Event(HoldsNodes):
         check_name("an event", self.name)
         if not isinstance(self.direction, (int, np.integer)) or self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
-        if self.reset is not None and not _is_function(self.reset):
+        if self.reset is not None and not is_function[1]:
             raise TypeError(f"event {self.name!r}: reset must be a function, got {self.reset!r:.40}")
         if self.reset is not None and self.terminal:
             raise ValueError(f"event {self.name!r}: a run that ends there goes on from no reset state; leave out one")
 
 
-def _is_function(value: object) -> bool:
-    return callable(value) and not isinstance(value, type)
-
-
 def as_events(events: Event | Iterable[Event]) -> tuple[Event, ...]:
     """One event or several, as a tuple. Raises TypeError for anything else, ValueError for two of one name."""
     several = (events,) if isinstance(events, Event) else tuple(sequence("events must be", events))
-    names = set()
-    for event in several:
+    for k, event in enumerate(several):
         if not isinstance(event, Event):
             raise TypeError(f"events must be of the type Event, got {type(event).__name__}: {event!r:.60}")
-        if event.name in names:
+        if event.name in [other.name for other in several[:k]]:
             raise ValueError(f"two events have the name {event.name!r}")
-        names.add(event.name)
     return several
 
 
@@ -144,7 +139,7 @@ class WatchedEvent:
 
 @dataclass(frozen=True, eq=False)
 class EventProgram:
-    """The events of a run, and of its states the names of the components, the rate, and the velocities, see Problem."""
+    """The events of a run, and of its states the names of the components, the rate and the velocities."""
 
     events: tuple[WatchedEvent, ...]
     components: tuple[str, ...]

