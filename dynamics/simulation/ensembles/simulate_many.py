@@ -136,7 +136,14 @@ def simulate_many(
     applied = with_applied(model, tau, parameters)
     start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
     run.check(start.states)
-    _require_room(run, *start.x.shape, stored=folder is not None)
+    if run.times is None and run.adaptive:
+        how = "t_eval must say which times to record, or method='rk4' make equal steps"
+        raise ValueError(f"{method!r} chooses the steps of each trajectory: {how}")
+    if folder is None:
+        (many, m), steps = start.x.shape, step_count(t_end - t0, run.step)
+        count = steps + 1 if run.times is None else len(run.times)
+        what = f"{many} trajectories of {count} rows of {m} numbers"
+        require_room(8 * many * count * m, what, "record fewer times (t_eval), simulate fewer at once or name a store")
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
@@ -233,17 +240,3 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
     if store is not None:
         whole.rows.flags.writeable = False
     return whole
-
-
-def _require_room(options: RunOptions, many: int, m: int, *, stored: bool) -> None:
-    """Raises ValueError if trajectories would not have the same rows, MemoryError if all would not fit."""
-    if options.times is None and options.adaptive:
-        raise ValueError(
-            f"{options.method!r} chooses the steps of each trajectory: t_eval must say which times to record, "
-            "or method='rk4' make equal steps"
-        )
-    times, length = options.times, options.t_end - options.t0
-    count = step_count(length, options.step) + 1 if times is None else len(times)
-    what = f"{many} trajectories of {count} rows of {m} numbers"
-    if not stored:
-        require_room(8 * many * count * m, what, "record fewer times (t_eval), simulate fewer at once or name a store")

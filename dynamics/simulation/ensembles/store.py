@@ -128,10 +128,10 @@ class Store:
         described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(header, described)
         size = header.tell() + 8 * math.prod(shape)
-        if not path.exists():
-            if any(self._folder.glob("chunk-*")):
-                raise ValueError(f"{damaged}it has results of chunks, and no {ROWS}")
+        if not any(self._folder.glob("chunk-*")):
             self._make_rows(header.getvalue(), size)
+        elif not path.exists():
+            raise ValueError(f"{damaged}it has results of chunks, and no {ROWS}")
         with path.open("rb") as file:
             if path.stat().st_size != size or file.read(header.tell()) != header.getvalue():
                 here = f"its {ROWS} of {path.stat().st_size} bytes is no table of NumPy of {shape}, of {size} bytes"
@@ -140,20 +140,19 @@ class Store:
 
     def _make_rows(self, header: bytes, size: int) -> None:
         """Make the file of the table, with all its room: a write through a memory map without would end the process."""
-        made, free = self._folder / f".{ROWS}.{os.getpid()}.tmp", shutil.disk_usage(self._folder).free
+        path, free = self._folder / ROWS, shutil.disk_usage(self._folder).free
         try:
             if size > free:
                 raise OSError(errno.ENOSPC, f"{free / GIB:.3g} GiB are free")
-            with made.open("wb") as file:
+            with path.open("wb") as file:
                 file.write(header)
                 file.truncate(size)
                 if hasattr(os, "posix_fallocate"):  # now, as nobody else may then take the room
                     os.posix_fallocate(file.fileno(), 0, size)
         except OSError as error:
-            made.unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
             needs = f"{self.name} needs {size / GIB:.3g} GiB for its {ROWS}, fewer with fewer times (t_eval)"
             raise OSError(error.errno, f"{needs}: {error.strerror}") from None
-        made.replace(self._folder / ROWS)
 
 
 def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json]:
@@ -174,8 +173,7 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "rtol": options.relative,
         "atol": np.asarray(options.absolute).tolist(),
         "t_eval": _digest(options.row_times.tobytes()),
-        "states": program.components,
-        "varied": problem.parameters,
+        "names": [*program.components, *problem.parameters],
         "events": [f"{event.name} {event.direction} {event.terminal}" for event in watched],
         "model": _digest(*[cg.structure_hash(graph).encode() for graph in [*model, *events] if graph is not None]),
         "steps": _digest(*[cg.structure_hash(graph).encode() for graph in program.steps.graphs()]),

@@ -12,8 +12,8 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics import simulate_many
-from dynamics.simulation.ensembles import lanes, task
-from dynamics.simulation.ensembles.lanes import FEW_TRAJECTORIES, VECTOR, fits_lanes
+from dynamics.simulation.ensembles import task
+from dynamics.simulation.ensembles.task import FEW_TRAJECTORIES, VECTOR, fits_lanes
 from dynamics.simulation.steps.equal_steps import EqualSteps
 from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
@@ -139,7 +139,7 @@ def test_lanes_that_are_interrupted_go_on_with_the_same_bits() -> None:
     model = random_arm(2)
     q, qd = starts(model, 4)
     whole = simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0])
-    with patch.object(lanes, "PASSES", 3), patch.object(lanes, "BLOCK_TIME", 0.0):
+    with patch.multiple(task, PASSES=3, BLOCK_TIME=0.0):
         assert same(whole, simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0]))
 
 

@@ -85,7 +85,7 @@ def test_many_steps_come_in_many_blocks() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dyn.SimulationWarning)
         whole = [simulate_many(*run, 0.2, "rk4", t_eval=times) for *run, times in runs]
-        with patch.multiple("dynamics.simulation.ensembles.lanes", PASSES=3), patch.object(task, "ROWS", 200):
+        with patch.multiple(task, PASSES=3, ROWS=200):
             blocks = [simulate_many(*run, 0.2, "rk4", t_eval=times) for *run, times in runs]
     assert all(map(same, whole, blocks))
     for one, other in zip(whole, blocks, strict=True):

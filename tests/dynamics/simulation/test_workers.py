@@ -17,7 +17,7 @@ from pytest import mark, raises
 
 from cgraph.codegen import llvm_engine
 from dynamics import simulate_many
-from dynamics.simulation.ensembles import lanes, task
+from dynamics.simulation.ensembles import task
 from dynamics.simulation.steps import step_program
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
@@ -104,7 +104,7 @@ def programs_made() -> int:
 
 def test_threads_make_the_code_once() -> None:
     model, q, qd = arms(40, 4)
-    with patch.object(lanes, "runner", wraps=lanes.runner) as making:
+    with patch.object(task, "runner", wraps=task.runner) as making:
         simulate_many(model, q, qd, 0.1, "rk4", workers=4, chunk=8)
         simulate_many(model, q, qd, 0.2, "rk4", workers=4, chunk=8)
     assert making.call_count == 1
@@ -155,18 +155,18 @@ def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str, ctrl_
 
 def test_ctrl_c_is_not_lost_at_the_end_of_a_chunk() -> None:
     """Machine code hands a signal on when it returns, and its chunk may be done then."""
-    made, to_end = list[Any](), lanes.LaneRun.to_end
+    made, to_end = list[Any](), task.LaneRun.to_end
 
     def interrupted(*arguments: Any) -> Any:
         made.append(to_end(*arguments))
         raise KeyboardInterrupt
 
-    with patch.object(lanes.LaneRun, "to_end", interrupted), raises(KeyboardInterrupt):
+    with patch.object(task.LaneRun, "to_end", interrupted), raises(KeyboardInterrupt):
         simulate_many(*arms(96), 0.01, "rk4", t_eval=[0.01], chunk=32, estimate_error=False)
     assert len(made) == 1
 
 
-@patch.object(lanes.LaneRun, "to_end", side_effect=RuntimeError("broken"))
+@patch.object(task.LaneRun, "to_end", side_effect=RuntimeError("broken"))
 def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(broken: object) -> None:
     before = set(threading.enumerate())
     with raises(RuntimeError, match="broken"):
