@@ -126,8 +126,7 @@ class Ensemble:
     t : ndarray
         Times, (T,) [s].
     q, qd : ndarray
-        Coordinates, (N, T, nq), and velocities, (N, T, n) [rad or m, per second]. Of an OdeSystem q holds the states,
-        (N, T, m), and qd has no columns.
+        Coordinates, (N, T, nq), and velocities, (N, T, n) [rad or m, per second]; of an OdeSystem q holds the states.
     stats : EnsembleStats
         How the runs went.
     events : mapping
@@ -171,8 +170,7 @@ class Ensemble:
     def to_xarray(self) -> xarray.Dataset:
         """Arrays with names (extra `tables`): all but `events`, whose number differs from trajectory to trajectory.
 
-        Its dimensions are trajectory, t, coordinate and velocity; parameters are coordinates of a trajectory, and each
-        of the statistics is a variable of it. Memory maps of a store stay what they are.
+        Its dimensions are trajectory, t, coordinate and velocity. Memory maps of a store stay what they are.
 
         Returns
         -------

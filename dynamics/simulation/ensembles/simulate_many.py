@@ -58,9 +58,8 @@ def simulate_many(
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
-    Trajectories run side by side, a vector of them at a time. One by one go all without machine code, those with
-    events, fewer than eight by a method that iterates, and in chosen steps fewer than 32, those with constraints and
-    those whose tolerance is below the rounding of a step. One whose state is not finite is NaN from there on,
+    Trajectories run side by side, a vector of them at a time; one by one without machine code, with events or, in
+    chosen steps, constraints, and where there are few. One whose state is not finite is NaN from there on,
     `stats.message` and a `SimulationWarning` say when and why, and the others go on. Ctrl-C is a KeyboardInterrupt.
 
     Parameters
@@ -91,8 +90,7 @@ def simulate_many(
         was ended, by whatever, and at last reads all from the folder, which one call at a time writes.
     **options
         Those of `dyn.Options` but `dense_output`; and `chunk`, how many trajectories a worker takes at a time: by
-        default up to four chunks for each worker, of at most 4096 trajectories, fewer where they have many rows, and of
-        at most 256 one by one or with a `store`. Side by side it is rounded up to multiples of 8.
+        default at most 4096, or 256 one by one or with a `store`. Side by side it is rounded up to multiples of 8.
 
     Returns
     -------
@@ -191,15 +189,12 @@ def ends_of(task: Task, x: Array, p: Array, workers: Workers) -> Array:
     team, rows = checked(workers), np.empty((len(x), 1, x.shape[1]))
     with np.errstate(all="ignore"):
         found = task.run_lanes(x, p, rows, lambda: False) if team == 1 and len(x) <= task.largest else None
-    whole = None
-    if found is None or not found[0].all():
-        whole = _run_chunks(task, x, p, task.width(None, team), team)
-    elif any(found[1].get("warnings", ())):
-        whole = Part(0, rows)
-        whole.reached(slice(None), **found[1])
-    for text in doubts(whole.stats(task.options.method, 0.0)) if whole is not None else ():
+    if found is not None and found[0].all() and not any(found[1].get("warnings", ())):
+        return rows[:, 0]
+    whole = _run_chunks(task, x, p, task.width(None, team), team)
+    for text in doubts(whole.stats(task.options.method, 0.0)):
         warnings.warn(text, SimulationWarning, stacklevel=3)
-    return rows[:, 0] if whole is None else whole.rows[:, 0]
+    return whole.rows[:, 0]
 
 
 def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None = None) -> Part:
@@ -218,22 +213,16 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
     def done() -> int:
         return len(x) - sum([len(chunk.x) for chunk in left.values()])
 
-    try:
-        with (
-            Progress("simulate", len(x), task.options.progress) as report,
-            closing(finished(task, [*left.values()], workers, whole.rows)) as parts,
-        ):
-            for part in parts:
-                whole.place(part)
-                if store is not None:
-                    store.keep(part)
-                left.pop(part.first, None)
-                report(done())
-    except KeyboardInterrupt:
-        if store is None:
-            raise
-        keeps = f"{store.name} keeps {done()} of {len(x)} trajectories"
-        raise KeyboardInterrupt(f"{keeps}: the same call goes on") from None
+    with (
+        Progress("simulate", len(x), task.options.progress) as report,
+        closing(finished(task, [*left.values()], workers, whole.rows)) as parts,
+    ):
+        for part in parts:
+            whole.place(part)
+            if store is not None:
+                store.keep(part)
+            left.pop(part.first, None)
+            report(done())
     if left:
         back = f"of {len(x)} trajectories came back {done()}"
         raise ValueError(f"workers must give a result for each item, as map does: {back}")

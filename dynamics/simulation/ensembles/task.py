@@ -45,8 +45,7 @@ PASSES = 64  # of the first block, before it is known how long one takes
 RESULTS = ["status", "t", "trials", "rejected", "evaluations", "at_limit", "longest_made"]
 
 Stopped = Callable[[], bool]
-# Of runs: flags of those that reached their end without a remark on their course, (k,), and columns of statistics.
-LaneRuns: TypeAlias = tuple[Flags, dict[str, Array]]
+LaneRuns: TypeAlias = tuple[Flags, dict[str, Array]]  # which reached their end without a remark; columns of statistics
 
 
 @kept_by_first
@@ -61,20 +60,16 @@ def lanes_of(program: StepProgram, backend: str, fma: bool) -> LaneCode | None:
     return runner(steps, backend, fma=fma).lane_code(clock, results, alike=program.adaptive)
 
 
-@kept_by_first
-def iterates(program: StepProgram) -> bool:
-    """Whether steps turn as often as numbers say, so that lanes wait for one another."""
-    kinds = FixedPoint if program.adaptive else FixedPoint | While  # what looks for a first step hardly ever turns
-    return any(isinstance(each, kinds) for each in program.steps.statements())
-
-
-def fits_lanes(program: StepProgram, options: RunOptions, grids: Sequence[EqualSteps], count: int) -> bool:
-    """Whether so many trajectories of a run without events go in lanes."""
-    if not program.adaptive:
-        return (count >= VECTOR or not iterates(program)) and sum([each.steps for each in grids]) <= options.max_steps
-    # With constraints a run is watched step by step, near flat positions; of tolerances below rounding it warns.
-    watched = program.rows is not None or options.relative < program.finest
-    return count >= FEW_TRAJECTORIES and not iterates(program) and not watched
+def fits_lanes(program: StepProgram, options: RunOptions, steps: int, count: int) -> bool:
+    """Whether so many trajectories of so many equal steps each, or of chosen ones, without events, go in lanes."""
+    if steps > options.max_steps or (program.adaptive and count < FEW_TRAJECTORIES):
+        return False
+    if program.adaptive and (program.rows is not None or options.relative < program.finest):
+        return False  # with constraints steps are watched, near flat positions; of tolerances below rounding is warned
+    # Where steps turn as often as numbers say lanes wait for one another; what looks for a first step hardly ever does.
+    kinds = FixedPoint if program.adaptive else FixedPoint | While
+    many = not program.adaptive and count >= VECTOR
+    return many or not any(isinstance(each, kinds) for each in program.steps.statements())
 
 
 class Leg(NamedTuple):
@@ -209,7 +204,7 @@ class Task:
             first = 0 if options.times is None else int(options.times[0] != options.t0)
             self._at_rows = np.arange(self.count) if options.times is None else numbers[first : first + self.count]
             self._steps = int(numbers[-1])
-        if events is None and fits_lanes(program, options, self._grids, many):
+        if events is None and fits_lanes(program, options, self._steps, many):
             rows = self.count
             if options.estimated:
                 self._beside = runs_beside(self._grids, program.order)

@@ -13,7 +13,7 @@ from cgraph._shared import Array
 
 from ..steps.dense_output import Indices, StepBlock
 from ..steps.state_sizes import Flags
-from .event import WatchedEvent
+from .event import WatchedEvent, numbers_of
 
 CELLS = 8  # of a step before the first split, so that it is looked at sixteen times at least
 NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(CELLS + 1) / CELLS)  # not evenly spaced: no oscillation hides between them
@@ -64,18 +64,18 @@ class WatchedSteps(NamedTuple):
     def values(self, rows: Indices, s: Array) -> Array:
         """The quantity."""
         _, _, t, x = self._points(rows, s)
-        return self.event.value(t, x, self.parameters).reshape(s.shape)
+        return numbers_of(self.event.values, t, x, self.parameters).reshape(s.shape)
 
     def slopes(self, rows: Indices, s: Array) -> Array:
         """Its derivatives by the share of the step."""
         rows, shares, t, x = self._points(rows, s)
         x_dot, t_dot = self.block.slopes_at(rows, shares), self.block.h[rows]
-        return self.event.slope(t, x, self.parameters, x_dot, t_dot).reshape(s.shape)
+        return numbers_of(self.event.slopes, t, x, self.parameters, x_dot, t_dot).reshape(s.shape)
 
     def rounding(self, rows: Indices, s: Array) -> Array:
         """Rounding errors of its values."""
         rows, _, t, x = self._points(rows, s)
-        error = self.event.error(t, x, self.parameters, *self.block.rounding(rows, t, x))
+        error = numbers_of(self.event.errors, t, x, self.parameters, *self.block.rounding(rows, t, x))
         return np.maximum(self.noise, error).reshape(s.shape)
 
 

@@ -26,14 +26,11 @@ ROUNDINGS = 8.0  # that the interpolation of a state, and the sum of a motion, m
 class Event(HoldsNodes):
     """Event: a quantity that passes through zero, and what happens there.
 
-    A quantity that touches zero and turns back counts too, with direction 0, where its extremum is zero to rounding.
-    One that stays zero for a while has one event, where it arrives; one that starts there has none before it comes
-    back, but for one with a reset and a direction, a contact: it happens there if it closes. Of events at one instant
-    those without a reset are first; then the first reset in the list that is due, again and again: what is zero and
-    moves in its direction. A jump by a reset is no crossing.
-
-    The quantity is looked at 16 to 1024 times in each step, until cubics between looks agree. Where that is too few,
-    `Stats.warnings` says so: limit the steps by `max_step` or `dt`.
+    What touches zero and turns back counts too, with direction 0. What stays zero for a while has one event, where it
+    arrives; what starts there has none before it comes back, but for a contact, with a reset and a direction, if it
+    closes. Of events at one instant those without a reset are first; then the first reset in the list that is due,
+    again and again: what is zero and moves in its direction. A jump by a reset is no crossing. The quantity is looked
+    at 16 to 1024 times in a step; where that is too few, `Stats.warnings` says so: take a shorter `max_step` or `dt`.
 
     Parameters
     ----------
@@ -121,20 +118,12 @@ class WatchedEvent:
         """Whether a crossing from a side, a sign, or a touch, is one of the event."""
         return self.direction == 0 or (self.direction * side < 0.0 and not touching)
 
-    def value(self, t: Array, x: Array, p: Sequence[float]) -> Array:
-        """g, (k,), at times (k,) and states (k, m)."""
-        g: Array = values_of(self.values, [*x.T, t, *p], len(t))[0]
-        return g
 
-    def slope(self, t: Array, x: Array, p: Sequence[float], x_dot: Array, t_dot: Array) -> Array:
-        """The derivative of g, (k,), where x and t have the derivatives x_dot (k, m) and t_dot (k,)."""
-        g: Array = values_of(self.slopes, [*x.T, t, *p, *x_dot.T, t_dot], len(t))[0]
-        return g
-
-    def error(self, t: Array, x: Array, p: Sequence[float], x_error: Array, t_error: Array) -> Array:
-        """Errors of g, (k,), from some roundings, where x and t are off by x_error (k, m) and t_error (k,)."""
-        g: Array = values_of(self.errors, [*x.T, t, *p, *x_error.T, t_error], len(t))[0]
-        return ROUNDINGS * g
+def numbers_of(graph: Graph, t: Array, x: Array, p: Sequence[float], *more: Array) -> Array:
+    """The output, (k,), at times (k,), states (k, m) and parameters, with tangents or errors of states and times."""
+    columns = [*x.T, t, *p, *[column for each in more for column in np.atleast_2d(each.T)]]
+    numbers: Array = values_of(graph, columns, len(t))[0]
+    return numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,5 +187,4 @@ def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
                 if (error := errors[arg]).value != 0.0:
                     total = total + abs(partial) * error
             errors[node] = total
-    outputs = {name: errors[node] for name, node in graph.outputs.items()}
-    return Graph([*graph.inputs, *leaves], outputs)
+    return Graph([*graph.inputs, *leaves], {name: ROUNDINGS * errors[node] for name, node in graph.outputs.items()})

@@ -15,21 +15,15 @@ from ...integrators.step_control import RESOLUTION
 from ..steps.dense_output import UNIT, StepBlock
 from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags
-from .crossings import MOST_CELLS, Crossing, Side, WatchedSteps, crossings
-from .event import EventProgram
+from .crossings import Crossing, Side, WatchedSteps, crossings
+from .event import EventProgram, numbers_of
 
 STEPS = 512  # looked at together
 ROUNDED = 3.0  # times a state, until it is read: at both ends of a step and between
 AT_ONCE = 32  # restarts of the run in a row, at one instant or of contacts that rest
 RESETS = 10_000  # one after another before a restart: more than bodies that touch need to come apart
-MISSED = (
-    "may have been missed, first after t = {:.6g} s: its quantity turns too often for "
-    f"{MOST_CELLS} looks in a step; shorter steps (max_step or dt) find all"
-)
-UNSIDED = (
-    "starts at zero and leaves it at t = {:.6g} s, where nothing is reset: it has no direction, which would tell on "
-    "which side it starts"
-)
+MISSED = "may have been missed, first after t = {:.6g} s; shorter steps (max_step or dt) find all"
+UNSIDED = "starts at zero and leaves it at t = {:.6g} s, where nothing is reset: it needs a direction, to know its side"
 
 Happening = tuple[int, float, Array]  # number of the event, time, state
 
@@ -199,17 +193,17 @@ class EventLog:
     def _look(self, t: float, x: Array, step: StepBlock | None = None) -> _Look:
         """The quantities at an instant of a step, also after resets there; or at a start."""
         at, states, p, events = np.array([t]), x[None], self.parameters, self.program.events
-        values = np.array([event.value(at, states, p)[0] for event in events])
+        values = np.array([numbers_of(event.values, at, states, p)[0] for event in events])
         end = 0.0 if step is None else step.x
         zero = np.abs(values) <= np.array([self._noise(number, t, x, end) for number in range(len(events))])
         x_dot = self.program.rates(at, states, p)
         fastest = np.fmax(self._gone[1:], np.where(np.isfinite(x_dot), np.abs(x_dot), 0.0))
         motions, none = np.zeros(len(events)), np.zeros_like(states)
         for number in np.flatnonzero(zero):
-            event = events[number]
-            motion = event.slope(at, states, p, x_dot, np.ones(1))[0]
-            off = event.error(at, states, p, fastest, np.ones(1)) - event.error(at, states, p, none, np.zeros(1))
-            motions[number] = 0.0 if abs(motion) <= self._roundings * off[0] else motion
+            motion = numbers_of(events[number].slopes, at, states, p, x_dot, np.ones(1))[0]
+            pairs = ((fastest, np.ones(1)), (none, np.zeros(1)))
+            off, own = [numbers_of(events[number].errors, at, states, p, *pair)[0] for pair in pairs]
+            motions[number] = 0.0 if abs(motion) <= self._roundings * (off - own) else motion
         return _Look(zero, values, motions if step is None else motions * np.sign(step.h[0]))
 
     @property
@@ -220,7 +214,8 @@ class EventLog:
     def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:
         """Error of a quantity by the rounding of states, also inside a step to an end (1, m)."""
         errors = self._roundings * self._gone[:1] + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
-        return float(self.program.events[number].error(np.array([t]), x[None], self.parameters, *errors)[0])
+        graph = self.program.events[number].errors
+        return float(numbers_of(graph, np.array([t]), x[None], self.parameters, *errors)[0])
 
     def _say(self, number: int, what: str, t: float) -> None:
         self.said.setdefault((number, what), f"event {self.program.events[number].name!r} {what.format(t)}")
