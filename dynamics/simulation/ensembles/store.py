@@ -10,7 +10,7 @@ import platform
 import shutil
 from dataclasses import fields
 from hashlib import blake2b
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import distributions
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -160,14 +160,10 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
     program, options, watched = task.program, task.options, task.events.events if task.events else ()
     model = [problem.rate, problem.velocities, program.normalization]
     events = [graph for event in watched for graph in (event.values, event.reset)]
-    try:
-        llvmlite = version("llvmlite")
-    except PackageNotFoundError:
-        llvmlite = ""
     known = {
         "format": FORMAT,
         "cgraph": cg.__version__,
-        "llvmlite": llvmlite,
+        "llvmlite": [each.version for each in distributions(name="llvmlite")],
         "machine": platform.machine(),
         **{field.name: getattr(options, field.name) for field in fields(options) if field.name != "progress"},
         "rtol": options.relative,

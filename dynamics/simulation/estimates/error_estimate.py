@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -46,7 +46,15 @@ LOOKS = 1024  # instants at which runs are compared, at most
 UNKNOWN = "the error is unknown"
 TOGETHER = 512  # states that are looked at once
 WAVES = ("sin", "cos", "tan")
-JUMPS = ("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal")
+# Of an operation that jumps or has a kink a number that changes only there.
+BRANCHES: dict[str, Callable[..., Node]] = {
+    **dict.fromkeys(
+        ("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal"), lambda node, *args: node
+    ),
+    **dict.fromkeys(("minimum", "maximum"), lambda node, a, b: less(a, b)),
+    "abs": lambda node, a: less(a, 0.0),
+    "fmod": lambda node, a, b: where(less(a / b, 0.0), -floor(-(a / b)), floor(a / b)),
+}
 
 
 class RunsBeside(NamedTuple):
@@ -77,21 +85,6 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     return RunsBeside(longest, share, 1.0, [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
 
 
-def _branches(node: Node) -> list[Node]:
-    """A number that changes only across the jump or the kink of a node's operation, if it has one."""
-    name, args = node.op.name, node.args
-    if name in JUMPS:
-        return [node]
-    if name in ("minimum", "maximum"):
-        return [less(*args)]
-    if name == "abs":
-        return [less(args[0], 0.0)]
-    if name == "fmod":
-        turns = args[0] / args[1]
-        return [where(less(turns, 0.0), -floor(-turns), floor(turns))]
-    return []
-
-
 @kept_by_first
 def unresolved(rate: Graph) -> tuple[Graph | None, int]:
     """Phases of waves in time, then branches, over the inputs of a rate; None if it has neither. How many phases."""
@@ -100,7 +93,8 @@ def unresolved(rate: Graph) -> tuple[Graph | None, int]:
         if not timed.isdisjoint(node.args):
             timed.add(node)
     waves = dict.fromkeys(node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed)
-    found = [*waves, *[branch for node in rate.nodes for branch in _branches(node)]]
+    branches = [BRANCHES[node.op.name](node, *node.args) for node in rate.nodes if node.op.name in BRANCHES]
+    found = [*waves, *branches]
     return (Graph(rate.inputs, {f"y{k}": node for k, node in enumerate(found)}) if found else None), len(waves)
 
 
@@ -109,14 +103,13 @@ class Watch:
 
     def __init__(self, rate: Graph, p: Array, t: float, x: Array) -> None:
         self._graph, self._waves = unresolved(rate)
-        self.needed = self._graph is not None
         self.turning = np.zeros(len(x))  # of the fastest sines and cosines [rad/s]
         self.bent = np.full(len(x), np.nan)  # start of the first step that passes a jump or a kink [s]
         self._p, self._seen = p, [(np.array([t]), x[:, None])]
 
     def add(self, t: Array, x: Array) -> None:
         """The next states, (k, r, m), at times t (r,)."""
-        if self.needed:
+        if self._graph is not None:
             self._seen.append((t, x))
             if sum([len(times) for times, _ in self._seen]) > TOGETHER:
                 self.look()
