@@ -27,16 +27,12 @@ class EnsembleStats:
     ----------
     method : str
         As `simulate_many` was asked for it.
-    steps, rejected, nfev, dt : ndarray
-        Those of `Stats`, (N,) each.
     seconds : float
         Run time of all of them together [s], compiling included.
-    success, status : ndarray
-        Those of `Stats`, (N,) each; one that an event ended has rows that are NaN from there on.
+    steps, rejected, nfev, dt, success, status, error, error_at_end : ndarray
+        Those of `Stats`, (N,) each; errors are NaN of a trajectory that has none.
     message, warnings : tuple
         N sentences, "reached t_end", or where and why it stopped; and N tuples of what speaks against each result.
-    error, error_at_end : ndarray
-        Those of `Stats`, (N,) each; NaN of a trajectory that has none.
 
     Examples
     --------
@@ -72,11 +68,10 @@ def doubts(stats: EnsembleStats) -> list[str]:
     """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
     early, many = np.flatnonzero(stats.status < 0), f"of {len(stats.warnings)} trajectories"
     doubtful = [k for k, texts in enumerate(stats.warnings) if texts] if any(stats.warnings) else []
-    have = "has" if len(doubtful) == 1 else "have"
     stopped = [f"trajectory {k} {stats.message[k].removeprefix('stopped ')}" for k in early[:1].tolist()]
     said = [f"trajectory {k}: {stats.warnings[k][0]}" for k in doubtful[:1]]
     return [f"{len(early)} {many} stopped early: {text}" for text in stopped] + [
-        f"{len(doubtful)} {many} {have} a warning: {text}" for text in said
+        f"{len(doubtful)} {many} {'has' if len(doubtful) == 1 else 'have'} a warning: {text}" for text in said
     ]
 
 
@@ -118,8 +113,7 @@ class Part:
 class Ensemble:
     """Many motions of one model, as `simulate_many` gives them.
 
-    q[k] is what trajectory k alone would have, (T, nq), in one piece of memory; NaN from a state on that is not finite.
-    Accelerations and multipliers of constraints are outputs of `forward_dynamics`, see `arrays_at`.
+    q[k] is what trajectory k alone would have, NaN where a state is not finite. For accelerations see `arrays_at`.
 
     Parameters
     ----------
@@ -194,9 +188,7 @@ class Ensemble:
             raise ImportError(f"this table needs xarray: {install('tables')}") from None
         stats, by_time, of_start = self.stats, ("trajectory", "t"), ("trajectory",)
         texts = {"message": stats.message, "warnings": ["; ".join(said) for said in stats.warnings]}
-        variables: dict[str, Any] = {
-            name: (of_start, np.array(texts.get(name, getattr(stats, name)))) for name in COLUMNS
-        }
+        variables: dict[str, Any] = {k: (of_start, np.array(texts.get(k, getattr(stats, k)))) for k in COLUMNS}
         columns = {"q": ("coordinate", self.q, self.q_start), "qd": ("velocity", self.qd, self.qd_start)}
         for name, (dimension, rows, start) in columns.items():
             variables |= {name: ((*by_time, dimension), rows), f"{name}_start": ((*of_start, dimension), start)}

@@ -101,8 +101,8 @@ def simulate_many(
     Raises
     ------
     TypeError, ValueError
-        For arguments of another type, shape or range, each by name, for `workers` that give no results, and for a
-        `store` that is damaged, or keeps another sweep, by what differs.
+        For arguments of another type, shape or range, each by name, `workers` without results, and a `store` that is
+        damaged or keeps another sweep.
     MemoryError
         For a result that would not fit.
     OSError
@@ -138,10 +138,9 @@ def simulate_many(
         how = "t_eval must say which times to record, or method='rk4' make equal steps"
         raise ValueError(f"{method!r} chooses the steps of each trajectory: {how}")
     if folder is None:
-        (many, m), steps = start.x.shape, step_count(t_end - t0, run.step)
-        count = steps + 1 if run.times is None else len(run.times)
-        what = f"{many} trajectories of {count} rows of {m} numbers"
-        require_room(8 * many * count * m, what, "record fewer times (t_eval), simulate fewer at once or name a store")
+        count = step_count(t_end - t0, run.step) + 1 if run.times is None else len(run.times)
+        what = f"{len(start.x)} trajectories of {count} rows of {start.x.shape[1]} numbers"
+        require_room(8 * count * start.x.size, what, "record fewer times (t_eval), simulate fewer or name a store")
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)

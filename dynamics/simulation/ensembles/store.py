@@ -37,8 +37,7 @@ class Store:
     """The folder of a sweep.
 
     sweep.json: what the sweep is, and how many trajectories are in a chunk.  rows.npy: the states (N, T, m) of all.
-    chunk-000000000.json, ..: how the trajectories from that number on went and the checksum of their rows, written once
-    these are.  lock.sqlite: empty, what one call at a time holds.
+    chunk-000000000.json, ..: how the trajectories from that number on went, and the checksum of their rows.
     """
 
     def __init__(self, folder: Path, sweep: dict[str, Json], width: int, shape: tuple[int, ...]) -> None:

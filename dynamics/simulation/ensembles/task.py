@@ -106,7 +106,7 @@ class LaneRun:
 
     def to_end(self, legs: Sequence[Leg], rows: Array, stopped: Stopped) -> LaneRuns:
         """Go all legs, with states for rows (k, T, m), NaN from where a run stops on."""
-        program, m, steps, longest = self._program, self._program.size, 0, 0.0
+        program, k, m, steps, longest = self._program, len(rows), self._program.size, 0, 0.0
         rows[:, 0] = self._x  # unless that is not at the start
         for grid, marks, here in legs:
             if grid is not None:
@@ -118,22 +118,19 @@ class LaneRun:
             if (self._passes[:, 1] < len(marks)).any():
                 block[np.arange(len(marks)) >= self._passes[:, 1:]] = np.nan
             rows[:, here] = block[:, : here.stop - here.start]
+        columns = {"nfev": self._read("evaluations"), "steps": np.full(k, steps), "dt": np.full(k, longest)}
         if not program.adaptive:
-            columns = {"steps": np.full(len(self._x), steps), "dt": np.full(len(self._x), longest)}
-            return self._read("nonfinite") == 0.0, {**columns, "nfev": self._read("evaluations")}
+            return self._read("nonfinite") == 0.0, columns
         # A run at a stability limit has a remark, which depends on its course.
         whole = (self._read("status") == DONE) & (self._read("at_limit") < HELD)
         rejected, length = self._read("rejected"), np.minimum(self._read("longest_made"), self._options.longest_step)
-        columns = {"steps": self._read("trials") - rejected, "rejected": rejected, "dt": length}
-        return whole, {**columns, "nfev": self._read("evaluations")}
+        return whole, {**columns, "steps": self._read("trials") - rejected, "rejected": rejected, "dt": length}
 
     def _set(self, values: Mapping[str, ArrayLike]) -> None:
-        """Set registers, those that there are."""
         for name in values.keys() & self._code.numbers.keys():
             self._memories[:, self._code.numbers[name]] = values[name]
 
     def _read(self, name: str) -> Array:
-        """A number of each."""
         return self._memories[:, self._code.numbers[name]][:, 0]
 
     def _going(self, marks: Array) -> tuple[Numbers, float]:
@@ -239,15 +236,15 @@ class Task:
 
     def run_lanes(self, x: Array, p: Array, rows: Array, stopped: Stopped) -> LaneRuns | None:
         """Run states x (k, m) with parameters p (k, ..) in lanes, into rows (k, T, m); None if they do not go there."""
-        program, options = self.program, self.options
+        program, options, beside = self.program, self.options, self._beside
         with _lock:
             lanes = lanes_of(program, options.backend, options.fma) if self.largest else None
         if lanes is None:
             return None
         (own, *others), run = self._legs, LaneRun(lanes, program, options, x, p)
-        if self._beside is None:
+        if beside is None:
             return run.to_end(own, rows, stopped)
-        beside, numbers, watch = self._beside, self._numbers, Watch(program.rate, p, options.t0, x)
+        numbers, watch = self._numbers, Watch(program.rate, p, options.t0, x)
         states = [np.empty((len(x), len(each), x.shape[1])) for each in numbers]
         whole, columns = run.to_end(own, states[0], stopped)
         for legs, each in zip(others, states[1:], strict=True):
@@ -267,7 +264,6 @@ class Task:
 
     @cached_property
     def _legs(self) -> list[list[Leg]]:
-        """Legs of the runs, and of those beside."""
         if self.program.adaptive:
             options, first = self.options, int(self.options.row_times[0] == self.options.t0)  # that a step makes
             return [[Leg(None, options.direction * options.row_times[first:], slice(first, self.count))]]
@@ -275,7 +271,6 @@ class Task:
         return [equal_legs(*each) for each in zip([self._grids, *beside], self._numbers, strict=True)]
 
     def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Stopped) -> None:
-        """Run these, each alone."""
         run: Stepper | None = None
         has_end = self.options.row_times[-1] == self.options.t_end
         for k in which:
@@ -287,8 +282,7 @@ class Task:
             run.set_parameters(p)
             if has_end and isinstance(run, ChosenStepper) and run.log is None:  # steps need not be looked at
                 if run.unseen(x):
-                    counts = {"steps": run.steps, "rejected": run.rejected, "nfev": run.evaluations, "dt": run.largest}
-                    part.reached(k, **counts)
+                    part.reached(k, steps=run.steps, rejected=run.rejected, nfev=run.evaluations, dt=run.largest)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue
                 run = stepper(compiled, self.options, p, stopped=stopped)  # whose first blocks are short: it says when
@@ -303,8 +297,7 @@ class Task:
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code
 
-Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
-Team = int | Map | Executor  # number of threads, or who does the work
+Team = int | Executor | Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]  # threads, or a map
 Workers = Team | None
 
 

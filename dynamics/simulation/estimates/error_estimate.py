@@ -2,8 +2,7 @@
 
 With an error that is e = C h^p along the run, x(2h) - x(h) = (2^p - 1) e, and x(4h) - x(2h) is 2^p times as large; how
 much larger it is tells the order that the run has. Of steps that are not all equal, 2^p is the ratio of the sums of
-h^(p + 1). Across a jump or a kink of the rate all may be off alike, and the error is unknown. This is the error of the
-state, phase included, not that of the energy.
+h^(p + 1). Across a jump or a kink of the rate all may be off alike, and the error is unknown.
 """
 
 from __future__ import annotations
@@ -134,8 +133,7 @@ def error_estimates(
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
-    The errors are relative to the sizes of components, and infinite if unknown.  rows: states of the runs, and of those
-    beside, (k, T, m) each; not finite where a run has stopped.
+    rows: states of the runs, and of those beside, (k, T, m) each; not finite where a run has stopped.
     """
     watch.look()
     apart = [other - one for one, other in itertools.pairwise(rows)]
@@ -160,10 +158,8 @@ def error_estimates(
         how = f"a dt shorter than {options.step:g} s, or method='dop853', which chooses its steps"
         how = f"; rtol = {options.relative:g} allows less: take {how}"
         if watch.turning[k] > resolved:
-            said = (
-                f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
-                f"{beside.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
-            )
+            said = f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
+            said += f"{beside.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
         elif not math.isnan(watch.bent[k]):
             said = f"{UNKNOWN} from t = {watch.bent[k]:.6g} s on: the rate has a jump or a kink there"
             how = ": take method='dop853', which finds its way across"

@@ -45,10 +45,9 @@ class Event(HoldsNodes):
         Whether the run ends there.
     reset : callable, optional
         The state from which the run goes on, reset(q, qd, t) or reset(q, qd, t, p) -> (q, qd) as nodes or numbers; of
-        an OdeSystem reset(x, t) or reset(x, t, p) -> x. Quaternions in q are brought to length 1. Both states are rows
-        of the trajectory, the first and the last of several resets at an instant; at a time of `t_eval`, the one before
-        is. A run whose resets follow one another in no time stops and says so. Without a direction, a reset that starts
-        at zero does not know its side: how it leaves from there resets nothing, and a warning says so.
+        an OdeSystem reset(x, t) or reset(x, t, p) -> x. Both states are rows of the trajectory, the first and the last
+        of several resets at an instant; at a time of `t_eval`, the one before is. A run whose resets follow one another
+        in no time stops. What starts at zero needs a direction, to know its side; a warning says so.
 
     Raises
     ------
@@ -78,10 +77,8 @@ class Event(HoldsNodes):
     def __post_init__(self) -> None:
         is_function = [callable(each) and not isinstance(each, type) for each in (self.value, self.reset)]
         if not isinstance(self.name, str) or not is_function[0] or not isinstance(self.terminal, bool):
-            raise TypeError(
-                "an event needs a name, a function, and True or False for `terminal`, got "
-                f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
-            )
+            got = f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
+            raise TypeError(f"an event needs a name, a function, and True or False for `terminal`, got {got}")
         check_name("an event", self.name)
         if not isinstance(self.direction, (int, np.integer)) or self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")

@@ -188,11 +188,9 @@ def _halves(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> tuple[Cells,
 
 
 def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
-    """Crossings in these steps, and flags of (steps,) in which more may have happened; moves `side` on.
-
-    Touching is an extremum that is zero to rounding. What stays zero arrives once; what rests and leaves to the other
-    side than its own crosses zero where it leaves.
-    """
+    """Crossings in these steps, and flags of (steps,) in which more may have happened; moves `side` on."""
+    # Touching is an extremum that is zero to rounding. What stays zero arrives once; what rests and leaves to the other
+    # side than its own crosses zero where it leaves.
     cells, beyond = event_cells(steps)
     # where steps meet, the slope is that at the end of the step before: a turn counts once
     first = np.flatnonzero(np.diff(cells.rows)) + 1
@@ -406,11 +404,9 @@ class EventLog:
         return resets or bool(self.ended)
 
     def _reset(self, step: StepBlock, t: float, x: Array, new: Mapping[int, Crossing], rested: Flags) -> None:
-        """Reset the state at an instant of a step.  rested: what was at zero at the start of the step.
-
-        One rule: what is due and has no reset happens, then the first reset that is due, and it is looked again. Due is
-        what is zero and moves to the other side than it has come from; what touches, once.
-        """
+        """Reset the state at an instant of a step.  rested: what was at zero at the start of the step."""
+        # What is due and has no reset happens, then the first reset that is due, and it is looked again. Due is what is
+        # zero and moves to the other side than it has come from; what touches, once.
         events, start, resets, look = self.program.events, x, list[int](), self._look(t, x, step)
         touching = {number for number, one in new.items() if one.touching}
         returns = np.flatnonzero(rested & look.zero & (look.motions * self._from > 0.0)).tolist()
@@ -484,9 +480,9 @@ class EventLog:
 
     def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:
         """Error of a quantity by the rounding of states, also inside a step to an end (1, m)."""
-        errors = self._roundings * self._gone[:1] + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
-        graph = self.program.events[number].errors
-        return float(numbers_of(graph, np.array([t]), x[None], self.parameters, *errors)[0])
+        graph, at, share = self.program.events[number].errors, np.array([t]), self._roundings
+        errors = share * self._gone[:1] + UNIT * np.abs(end), share * np.abs(at)
+        return float(numbers_of(graph, at, x[None], self.parameters, *errors)[0])
 
     def _say(self, number: int, what: str, t: float) -> None:
         self.said.setdefault((number, what), f"event {self.program.events[number].name!r} {what.format(t)}")
