@@ -45,7 +45,7 @@ from .trajectory import SimulationWarning, Trajectory
 from .unreached_momenta import unreached_momenta
 
 if TYPE_CHECKING:
-    from .ensembles.workers import Workers
+    from .ensembles.task import Workers
 
 KEPT_PARAMETERS = 16  # sets of parameter values, whose equations a run keeps
 

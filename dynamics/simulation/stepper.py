@@ -265,11 +265,6 @@ class EqualStepper(Stepper):
         other.stretches = stretches
         return other
 
-    def again(self, dt: float) -> EqualStepper:
-        """The stepper of the same run, without a controller, by steps of at most dt, which meet its end alone."""
-        options = replace(self.options, dt=dt, t_eval=None, max_steps=math.inf)
-        return EqualStepper(self.compiled, options, self.parameters, log=self.log, stopped=self.stopped)
-
     def _recorded(self, t0: float, t_end: float) -> Iterator[StepBlock]:
         instants = [t0, *[t for t in self.options.instants if self.options.direction * (t - t0) > 0.0]]
         instants = instants if self.control is None else self.control.instants(instants)

@@ -66,11 +66,10 @@ class Stats:
         Of equal steps, the estimated error of the state, phase included, the largest over the run, and that at the end,
         in units of the largest value of a component over the run, of the component where it is largest. It is the
         difference from a run of steps twice as long over 2^k - 1, where one of steps four times as long tells the order
-        k, at most the method's; across jumps and kinks, and where it is large, the difference itself. Runs are compared
-        at up to a thousand instants, and where they have had as many resets. The errors of a SampledController's
-        periods are added up, which holds where the closed loop does not amplify them. Infinite where it is unknown,
-        which a warning explains. None of chosen steps, of runs without `estimate_error`, and of those that fail or end
-        in the first steps.
+        k, at most the method's; where it is large, the difference itself. Runs are compared at up to a thousand
+        instants. Infinite where it is unknown, as where the rate has a jump or a kink on the way, which a warning
+        explains. None of chosen steps, of runs without `estimate_error`, with a SampledController or events that reset
+        the state, and of those that fail or end in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from ..outcome import REACHED
 from ..trajectory import Crossings
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
@@ -29,23 +27,12 @@ class EnsembleStats:
     ----------
     method : str
         As `simulate_many` was asked for it.
-    steps, rejected, nfev : ndarray
-        Accepted steps, trials of a step that were not accepted, and evaluations of the rate, (N,) each.
-    dt : ndarray
-        The largest step taken, (N,) [s].
     seconds : float
         Run time of all of them together [s], compiling included.
-    success : ndarray
-        Whether it reached t_end, (N,).
-    message : tuple of str
-        N sentences: "reached t_end", or where and why it stopped.
-    status : ndarray
-        0: its end was reached; 1: an event ended it, where its end is: `success` is True, and its rows from there on
-        NaN; -1: it failed, (N,).
-    error, error_at_end : ndarray
-        Of equal steps, the estimated errors of `Stats`, (N,); NaN of a trajectory that has none.
-    warnings : tuple of tuple of str
-        What speaks against each result, N tuples.
+    steps, rejected, nfev, dt, success, status, error, error_at_end : ndarray
+        Those of `Stats`, (N,) each; errors are NaN of a trajectory that has none.
+    message, warnings : tuple
+        N sentences, "reached t_end", or where and why it stopped; and N tuples of what speaks against each result.
 
     Examples
     --------
@@ -79,24 +66,19 @@ COLUMNS: dict[str, type] = {
 
 def doubts(stats: EnsembleStats) -> list[str]:
     """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
-    early = np.flatnonzero(stats.status < 0)
+    early, many = np.flatnonzero(stats.status < 0), f"of {len(stats.warnings)} trajectories"
     doubtful = [k for k, texts in enumerate(stats.warnings) if texts] if any(stats.warnings) else []
-    many, have, said = f"of {len(stats.warnings)} trajectories", "has" if len(doubtful) == 1 else "have", list[str]()
-    for k in early[:1].tolist():
-        said.append(f"{len(early)} {many} stopped early: trajectory {k} {stats.message[k].removeprefix('stopped ')}")
-    for k in doubtful[:1]:
-        said.append(f"{len(doubtful)} {many} {have} a warning: trajectory {k}: {stats.warnings[k][0]}")
-    return said
+    stopped = [f"trajectory {k} {stats.message[k].removeprefix('stopped ')}" for k in early[:1].tolist()]
+    said = [f"trajectory {k}: {stats.warnings[k][0]}" for k in doubtful[:1]]
+    return [f"{len(early)} {many} stopped early: {text}" for text in stopped] + [
+        f"{len(doubtful)} {many} {'has' if len(doubtful) == 1 else 'have'} a warning: {text}" for text in said
+    ]
 
 
 class Part:
-    """Results of trajectories first, first + 1, ..: rows (k, T, m), NaN after one has stopped, and their statistics.
-
-    columns: {name of `EnsembleStats`: of each}, and "happened", the events of each.
-    """
+    """Results of trajectories first, first + 1, ..: rows (k, T, m), columns of statistics, and "happened", events."""
 
     def __init__(self, first: int, rows: Array) -> None:
-        """Before the first step; rows: where they are to be."""
         self.first, self.rows = first, rows
         kinds = {**COLUMNS, "happened": np.object_}
         self.columns: dict[str, Any] = {name: np.zeros(len(rows), dtype=kind) for name, kind in kinds.items()}
@@ -131,17 +113,14 @@ class Part:
 class Ensemble:
     """Many motions of one model, as `simulate_many` gives them.
 
-    q[k] is what trajectory k alone would have, (T, nq), in one piece of memory, as in MuJoCo's rollout and a vmap. From
-    where a state of a trajectory was not finite on its rows are NaN. It keeps states alone: accelerations, and the
-    multipliers of constraints, are outputs of `forward_dynamics` at q[k], qd[k], see `arrays_at`.
+    q[k] is what trajectory k alone would have, NaN where a state is not finite. For accelerations see `arrays_at`.
 
     Parameters
     ----------
     t : ndarray
         Times, (T,) [s].
     q, qd : ndarray
-        Coordinates, (N, T, nq), and velocities, (N, T, n) [rad or m, per second]. Of an OdeSystem q holds the states,
-        (N, T, m), and qd has no columns.
+        Coordinates, (N, T, nq), and velocities, (N, T, n) [rad or m, per second]; of an OdeSystem q holds the states.
     stats : EnsembleStats
         How the runs went.
     events : mapping
@@ -182,51 +161,10 @@ class Ensemble:
         whole = int(np.count_nonzero(self.stats.success))
         return f"<Ensemble of {many}, {what}: {rows} rows{span}; {self.stats.method}, {whole} reached t_end>"
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """A row for each trajectory and time (extra `tables`).
-
-        Its index is (trajectory, t); its columns are coordinates "q.<name>" and velocities "qd.<name>", momenta
-        "p.<name>", then parameters, then `success` and `message`. Starts, events and other statistics are not in it. A
-        file is pandas' own, as in `.to_parquet("fall.parquet")`.
-
-        Returns
-        -------
-        pandas.DataFrame
-            N times T rows, in memory.
-
-        Raises
-        ------
-        ImportError
-            Where pandas is not installed.
-
-        Examples
-        --------
-        >>> import dynamics as dyn
-        >>> spring = dyn.System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2, "x", {"k": 1.0})
-        >>> sweep = dyn.simulate_many(spring, [1.0], [0.0], 1.0, parameters={"k": [1.0, 4.0]}, t_eval=[0.0, 1.0])
-        >>> table = sweep.to_pandas()
-        >>> table["q.x"].loc[1, 1.0].round(3), table["k"].loc[1, 1.0]
-        (np.float64(-0.416), np.float64(4.0))
-        """
-        module, (many, rows, _) = _module("pandas"), self.q.shape
-        blocks = {"q": (self.coordinates, self.q), "qd": (self.velocities, self.qd)}
-        blocks |= {} if self.p is None else {"p": (self.velocities, self.p)}
-        columns = {
-            f"{letter}.{name}": values[:, :, k].reshape(-1)
-            for letter, (names, values) in blocks.items()
-            for k, name in enumerate(names)
-        }
-        message = np.array(self.stats.message, object)
-        own = {**self.parameters, "success": self.stats.success, "message": message}
-        columns |= {name: np.repeat(values, rows) for name, values in own.items()}
-        index = module.MultiIndex.from_product([np.arange(many), self.t], names=["trajectory", "t"])
-        return module.DataFrame(columns, index)
-
     def to_xarray(self) -> xarray.Dataset:
         """Arrays with names (extra `tables`): all but `events`, whose number differs from trajectory to trajectory.
 
-        Its dimensions are trajectory, t, coordinate and velocity; parameters are coordinates of a trajectory, and each
-        of the statistics is a variable of it. Memory maps of a store stay what they are.
+        Its dimensions are trajectory, t, coordinate and velocity. Memory maps of a store stay what they are.
 
         Returns
         -------
@@ -244,19 +182,18 @@ class Ensemble:
         >>> fan.to_xarray().q.sel(coordinate="joint 1", t=1.0).values.round(4)
         array([-0.077, -0.155])
         """
-        module, stats = _module("xarray"), self.stats
-        by_time, of_start = ("trajectory", "t"), ("trajectory",)
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError(f"this table needs xarray: {install('tables')}") from None
+        stats, by_time, of_start = self.stats, ("trajectory", "t"), ("trajectory",)
+        texts = {"message": stats.message, "warnings": ["; ".join(said) for said in stats.warnings]}
+        variables: dict[str, Any] = {k: (of_start, np.array(texts.get(k, getattr(stats, k)))) for k in COLUMNS}
         columns = {"q": ("coordinate", self.q, self.q_start), "qd": ("velocity", self.qd, self.qd_start)}
-        variables: dict[str, Any] = {}
         for name, (dimension, rows, start) in columns.items():
-            variables[name] = ((*by_time, dimension), rows)
-            variables[f"{name}_start"] = ((*of_start, dimension), start)
+            variables |= {name: ((*by_time, dimension), rows), f"{name}_start": ((*of_start, dimension), start)}
         if self.p is not None:
             variables["p"] = ((*by_time, "velocity"), self.p)
-        for name in ("steps", "rejected", "nfev", "dt", "success", "status", "error", "error_at_end"):
-            variables[name] = (of_start, getattr(stats, name))
-        variables["message"] = (of_start, np.array(stats.message))
-        variables["warnings"] = (of_start, np.array(["; ".join(said) for said in stats.warnings]))
         if shared := sorted({"trajectory", "t", "coordinate", "velocity", *variables} & {*self.parameters}):
             raise ValueError(f"the parameter {shared[0]!r} has the name of a column of the table: give it another name")
         coordinates = {
@@ -266,12 +203,4 @@ class Ensemble:
             "velocity": list(self.velocities),
             **{name: (of_start, values) for name, values in self.parameters.items()},
         }
-        return module.Dataset(variables, coordinates, {"method": stats.method})
-
-
-def _module(name: str) -> Any:
-    """The package. Raises ImportError that names the extra."""
-    try:
-        return import_module(name)
-    except ImportError:
-        raise ImportError(f"this table needs {name}: {install('tables')}") from None
+        return xarray.Dataset(variables, coordinates, {"method": stats.method})

@@ -32,8 +32,7 @@ from ..trajectory import SimulationWarning
 from ..unreached_momenta import unreached_momenta
 from .ensemble import Ensemble, Part, doubts
 from .store import Store, sweep_of
-from .task import Chunk, Task
-from .workers import Team, Workers, checked, finished
+from .task import Chunk, Task, Team, Workers, checked, finished
 
 
 class ManyOptions(Options, total=False):
@@ -59,11 +58,9 @@ def simulate_many(
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
-    Trajectories run side by side, a vector of them at a time, in equal steps and in chosen ones. One by one, to the
-    same bits, go those with events, fewer than eight by a method that iterates, and in chosen steps fewer than 32,
-    those with constraints and those whose tolerance is below the rounding of a step. One whose state is not finite is
-    NaN from there on, `stats.message` and a `SimulationWarning` name the time and the coordinate, and the others go on.
-    Ctrl-C is a KeyboardInterrupt; a store keeps the chunks that are done, and the error says how many trajectories.
+    Trajectories run side by side, a vector of them at a time; one by one without machine code, with events or, in
+    chosen steps, constraints, and where there are few. One whose state is not finite is NaN from there on,
+    `stats.message` and a `SimulationWarning` say when and why, and the others go on. Ctrl-C is a KeyboardInterrupt.
 
     Parameters
     ----------
@@ -78,42 +75,34 @@ def simulate_many(
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
         steps need it.
     events : Event or iterable of Event
-        Instants to look for on the way, as in `simulate`; trajectories then run one by one. One that an event ends is
-        NaN from there on, and `stats.status` is 1. Rows are at the same times as without.
+        As in `simulate`. A trajectory that one ends is NaN from there on, and its `stats.status` is 1.
     tau : float, array_like or callable
         Constant applied force [N m or N], for all velocities, for each, (n,), or for each trajectory too, (N, n); or a
-        controller in closed form, see `with_controller`. A `SampledController`, which may remember what it has seen, is
-        refused: it controls one run of `simulate`.
+        controller in closed form, see `with_controller`, but no `SampledController`.
     parameters : mapping, optional
-        {name: value} in place of the model's own, and of those of a controller, one for each trajectory, (N,), or a
-        number for all. A number is built into the machine code, and another one compiles anew: what changes from call
-        to call is an array (N,).
+        {name: value} in place of the model's own, and of those of a controller: for each trajectory, (N,), or a number
+        for all, which is built into the machine code, so that another one compiles anew.
     workers : int, Executor, callable or None
         How many threads share the work, None for one on each core; or an executor of `concurrent.futures`, such as
-        Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The numbers are the same to the last
-        bit.
+        Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The bits are the same.
     store : path, optional
-        A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
-        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder, which one
-        call at a time writes. A chunk that had not ended is lost.
+        A folder, empty or not there, in which chunks are kept as they end. The same call again goes on where the first
+        was ended, by whatever, and at last reads all from the folder, which one call at a time writes.
     **options
         Those of `dyn.Options` but `dense_output`; and `chunk`, how many trajectories a worker takes at a time: by
-        default up to four chunks for each worker, of at most 4096 trajectories, fewer where they have many rows, and of
-        at most 256 one by one or with a `store`. Side by side it is rounded up to whole vectors, multiples of 8.
+        default at most 4096, or 256 one by one or with a `store`. Side by side it is rounded up to multiples of 8.
 
     Returns
     -------
     Ensemble
         t (T,), q (N, T, nq), qd (N, T, n), and `stats` with an entry for each trajectory. With a store q and qd are
-        memory maps of its file: what is read of them is loaded, and they cannot be written. With `form="momentum"` qd
-        are computed, and in memory.
+        memory maps of its file, which cannot be written; with `form="momentum"` qd are computed, and in memory.
 
     Raises
     ------
     TypeError, ValueError
-        For arguments of another type, shape or range, each by name, for `workers` that give no results, and for a
-        `store` that keeps another sweep, by what differs: model, starts, parameters, options, versions; and for a
-        `store` that is damaged.
+        For arguments of another type, shape or range, each by name, `workers` without results, and a `store` that is
+        damaged or keeps another sweep.
     MemoryError
         For a result that would not fit.
     OSError
@@ -145,7 +134,13 @@ def simulate_many(
     applied = with_applied(model, tau, parameters)
     start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
     run.check(start.states)
-    _require_room(run, *start.x.shape, stored=folder is not None)
+    if run.times is None and run.adaptive:
+        how = "t_eval must say which times to record, or method='rk4' make equal steps"
+        raise ValueError(f"{method!r} chooses the steps of each trajectory: {how}")
+    if folder is None:
+        count = step_count(t_end - t0, run.step) + 1 if run.times is None else len(run.times)
+        what = f"{len(start.x)} trajectories of {count} rows of {start.x.shape[1]} numbers"
+        require_room(8 * count * start.x.size, what, "record fewer times (t_eval), simulate fewer or name a store")
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
@@ -193,71 +188,43 @@ def ends_of(task: Task, x: Array, p: Array, workers: Workers) -> Array:
     team, rows = checked(workers), np.empty((len(x), 1, x.shape[1]))
     with np.errstate(all="ignore"):
         found = task.run_lanes(x, p, rows, lambda: False) if team == 1 and len(x) <= task.largest else None
-    whole = None
-    if found is None or not found[0].all():
-        whole = _run_chunks(task, x, p, task.width(None, team), team)
-    elif any(found[1].get("warnings", ())):
-        whole = Part(0, rows)
-        whole.reached(slice(None), **found[1])
-    for text in doubts(whole.stats(task.options.method, 0.0)) if whole is not None else ():
+    if found is not None and found[0].all() and not any(found[1].get("warnings", ())):
+        return rows[:, 0]
+    whole = _run_chunks(task, x, p, task.width(None, team), team)
+    for text in doubts(whole.stats(task.options.method, 0.0)):
         warnings.warn(text, SimulationWarning, stacklevel=3)
-    return rows[:, 0] if whole is None else whole.rows[:, 0]
+    return whole.rows[:, 0]
 
 
 def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None = None) -> Part:
-    """Run the chunks, by whoever shares them, until all parts have come.
-
-    Those that a store has are taken from there, and others are kept there as they end.
-    Raises ValueError unless all parts come.
-    """
-    rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
-    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
-    if store is None and len(chunks) == 1 and isinstance(workers, int):
-        return task.run(chunks[0], rows, lambda: False)
-    whole, came = Part(0, rows), dict[int, int]()  # trajectories, by the first
+    """Run the chunks that a store has not, by whoever shares them. Raises ValueError unless all parts come."""
+    whole = Part(0, np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows)
+    left = {k: Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)}
+    if store is None and len(left) == 1 and isinstance(workers, int):
+        return task.run(left[0], whole.rows, lambda: False)
     if store is not None:
-        known = {chunk.first: part for chunk in chunks if (part := store.part(chunk)) is not None}
-        for part in known.values():
-            whole.place(part)
-            came[part.first] = len(part.rows)
-        chunks = [chunk for chunk in chunks if chunk.first not in known]
-        if chunks:
+        for known in [part for chunk in left.values() if (part := store.part(chunk)) is not None]:
+            whole.place(known)
+            del left[known.first]
+        if left:
             store.lock()
-    try:
-        with (
-            Progress("simulate", len(x), task.options.progress) as report,
-            closing(finished(task, chunks, workers, whole.rows)) as parts,
-        ):
-            for part in parts:
-                whole.place(part)
-                if store is not None:
-                    store.keep(part)
-                came[part.first] = len(part.rows)
-                report(sum(came.values()))
-    except KeyboardInterrupt:
-        if store is None:
-            raise
-        raise KeyboardInterrupt(store.kept(sum(came.values()))) from None
-    if (done := sum(came.values())) != len(x):
-        back = f"of {len(x)} trajectories came back {done}"
+
+    def done() -> int:
+        return len(x) - sum([len(chunk.x) for chunk in left.values()])
+
+    with (
+        Progress("simulate", len(x), task.options.progress) as report,
+        closing(finished(task, [*left.values()], workers, whole.rows)) as parts,
+    ):
+        for part in parts:
+            whole.place(part)
+            if store is not None:
+                store.keep(part)
+            left.pop(part.first, None)
+            report(done())
+    if left:
+        back = f"of {len(x)} trajectories came back {done()}"
         raise ValueError(f"workers must give a result for each item, as map does: {back}")
     if store is not None:
-        whole.rows = store.read_only()
+        whole.rows.flags.writeable = False
     return whole
-
-
-def _require_room(options: RunOptions, many: int, m: int, *, stored: bool) -> None:
-    """Raises ValueError if trajectories would not have the same rows, MemoryError if all would not fit.
-
-    stored: in a file, not in memory.
-    """
-    if options.times is None and options.adaptive:
-        raise ValueError(
-            f"{options.method!r} chooses the steps of each trajectory: t_eval must say which times to record, "
-            "or method='rk4' make equal steps"
-        )
-    times, length = options.times, options.t_end - options.t0
-    count = step_count(length, options.step) + 1 if times is None else len(times)
-    what = f"{many} trajectories of {count} rows of {m} numbers"
-    if not stored:
-        require_room(8 * many * count * m, what, "record fewer times (t_eval), simulate fewer at once or name a store")

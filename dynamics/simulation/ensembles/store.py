@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
 import platform
 import shutil
+from dataclasses import fields
 from hashlib import blake2b
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import distributions
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile
 from zlib import crc32
 
 import numpy as np
@@ -28,76 +29,59 @@ if TYPE_CHECKING:
     import sqlite3
 
 SWEEP, ROWS, LOCK = "sweep.json", "rows.npy", "lock.sqlite"
-FORMAT = 1
-NUMBERS = [name for name, kind in COLUMNS.items() if kind is not np.object_]
-AGAIN = "remove the folder, and the sweep begins anew"
+FORMAT = 2
+GIB = 2**30
 
 
 class Store:
     """The folder of a sweep.
 
-    sweep.json: what the sweep is, see `sweep_of`, and how many trajectories are in a chunk.  rows.npy: the states
-    (N, T, m) of all, in place.  chunk-000000000.npz, ..: how the trajectories from that number on went and the checksum
-    of their rows, a file each, which is there once their rows are.  lock.sqlite: what one call at a time holds, see
-    `lock`; it has nothing in it.
-
-    width: trajectories in a chunk, as the sweep began.  rows: the table, written through to the file.
+    sweep.json: what the sweep is, and how many trajectories are in a chunk.  rows.npy: the states (N, T, m) of all.
+    chunk-000000000.json, ..: how the trajectories from that number on went, and the checksum of their rows.
     """
 
     def __init__(self, folder: Path, sweep: dict[str, Json], width: int, shape: tuple[int, ...]) -> None:
         """Open the folder, or begin it. Raises ValueError where it keeps something else, OSError where it cannot be."""
-        self._folder, self._name, self.width = folder, f"store {str(folder)!r}", width
+        self._folder, self.name = folder, f"store {str(folder)!r}"
         self._lock: sqlite3.Connection | None = None
         folder.mkdir(parents=True, exist_ok=True)
         try:
-            self._open(sweep, shape)
+            known = self._known()
+            if not known or not all(self._file(k).exists() for k in range(0, shape[0], known["chunk"])):
+                self.lock()  # else the folder is read alone
+                known = self._known()
+            if not known:
+                if any(path.name != LOCK for path in folder.iterdir()):
+                    raise ValueError(f"{self.name} is a folder with other files and without a sweep: name an empty one")
+                known = {**sweep, "chunk": width}
+                atomic_write(folder / SWEEP, json.dumps(known, indent=1))
+            for name, value in sweep.items():
+                if known.get(name) != value:
+                    there = f"there {name} is {known.get(name)!r:.60}, here {value!r:.60}"
+                    raise ValueError(f"{self.name} keeps another sweep: {there}")
+            self.width, self.rows = known["chunk"], self._table(shape)
         except BaseException:
             self.close()
             raise
 
-    def _open(self, sweep: dict[str, Json], shape: tuple[int, ...]) -> None:
-        folder, known = self._folder, self._read()
-        left_over = list(folder.glob(".*.tmp"))  # of files that a process was writing when it was ended
-        chunks = [self._file(first) for first in range(0, shape[0], known["chunk"])] if known else []
-        if left_over or not chunks or not all(path.exists() for path in chunks):  # else the folder is read alone
-            self.lock()
-            for path in left_over:
-                path.unlink(missing_ok=True)
-            known = self._read()
-        if known:
-            for name, value in sweep.items():
-                if known.get(name) != value:
-                    there = f"there {name} is {known.get(name)!r:.60}, here {value!r:.60}"
-                    raise ValueError(f"{self._name} keeps another sweep: {there}")
-            self.width = known["chunk"]
-        elif any(path.name != LOCK for path in folder.iterdir()):
-            raise ValueError(f"{self._name} is a folder with other files and without a sweep: name an empty one")
-        else:
-            atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": self.width}, indent=1))
-        if not (folder / ROWS).exists():
-            self._make_rows(shape)
-        self.rows = self._table(shape)
-
     def lock(self) -> None:
-        """Take the folder for this call alone, until `close` or the end of the process, however that ends.
-
-        SQLite's lock does that on every system. Raises OSError where another call has taken it.
-        """
-        import sqlite3  # for what is written alone
+        """Take the folder for this call alone, until `close` or the process ends. Raises OSError if it is taken."""
+        import sqlite3  # whose lock does that on every system
 
         if self._lock is not None:
             return
-        lock = sqlite3.connect(self._folder / LOCK, timeout=0.0, check_same_thread=False)
+        self._lock = sqlite3.connect(self._folder / LOCK, timeout=0.0, check_same_thread=False)
         try:
-            lock.execute("PRAGMA journal_mode = MEMORY")  # no file beside
-            lock.execute("BEGIN EXCLUSIVE")
+            self._lock.execute("PRAGMA journal_mode = MEMORY")  # no file beside
+            self._lock.execute("BEGIN EXCLUSIVE")
         except sqlite3.OperationalError as error:
-            lock.close()
+            self.close()
             if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
-                raise OSError(f"{self._name} cannot be locked: {error}") from None
+                raise OSError(f"{self.name} cannot be locked: {error}") from None
             other = "another call of simulate_many, here or in another process"
-            raise OSError(f"{self._name} is being written by {other}: wait for it, or name another folder") from None
-        self._lock = lock
+            raise OSError(f"{self.name} is being written by {other}: wait for it, or name another folder") from None
+        for path in self._folder.glob(".*.tmp"):  # what a process was writing when it was ended
+            path.unlink(missing_ok=True)
 
     def close(self) -> None:
         """Leave the folder to others."""
@@ -105,117 +89,86 @@ class Store:
             self._lock.close()
             self._lock = None
 
-    def kept(self, done: int) -> str:
-        """Sentence on what the folder has of a sweep that was interrupted."""
-        return f"{self._name} keeps {done} of {len(self.rows)} trajectories: the same call goes on"
-
     def part(self, chunk: Chunk) -> Part | None:
         """The results of a chunk, if they are there."""
         part = Part(chunk.first, self.rows[chunk.first : chunk.first + len(chunk.x)])
         try:
-            with np.load(self._file(chunk.first), allow_pickle=False) as kept:
-                part.put(slice(None), **{name: kept[name] for name in NUMBERS})
-                texts, checksum = json.loads(kept["texts"].tobytes()), int(kept["checksum"])
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # not there, or damaged: the chunk is run again
+            kept = json.loads(self._file(chunk.first).read_text(encoding="utf-8"))
+            part.put(slice(None), **{name: kept[name] for name in COLUMNS.keys() - {"warnings"}})
+            for k, (said, log) in enumerate(zip(kept["warnings"], kept["happened"], strict=True)):
+                part.put(k, warnings=tuple(said), happened=[(number, t, np.array(x)) for number, t, x in log])
+            return part if crc32(part.rows.data) == kept["checksum"] else None
+        except (OSError, ValueError, KeyError, TypeError):  # not there, or damaged: the chunk is run again
             return None
-        part.put(slice(None), message=texts["messages"])
-        for k, said in enumerate(texts["warnings"]):
-            part.put(k, warnings=tuple(said))
-        for k, log in enumerate(texts["happened"]):
-            part.put(k, happened=[(number, t, np.array(x)) for number, t, x in log])
-        return part if crc32(part.rows.data) == checksum else None
 
     def keep(self, part: Part) -> None:
         """Write how the trajectories of a part went; their rows are in the table."""
-        self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
-        columns, written = part.columns, BytesIO()
-        happened = [[(number, t, x.tolist()) for number, t, x in log] for log in columns["happened"]]
-        texts = {"messages": columns["message"].tolist(), "warnings": columns["warnings"].tolist()}
-        words = json.dumps({**texts, "happened": happened if any(happened) else []}).encode()
+        self.rows.flush()
+        kept = {name: values.tolist() for name, values in part.columns.items()}
+        kept["happened"] = [[(number, t, x.tolist()) for number, t, x in log] for log in kept["happened"]]
         checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
-        kept: dict[str, Any] = {"texts": np.frombuffer(words, np.uint8), "checksum": np.array(checksum, np.uint32)}
-        np.savez(written, **kept, **{name: columns[name] for name in NUMBERS})
-        atomic_write(self._file(part.first), written.getvalue())
-
-    def read_only(self) -> Array:
-        """The table, of which rows are read when they are asked for, and none can be written."""
-        table: Array = np.load(self._folder / ROWS, mmap_mode="r")
-        return table
+        atomic_write(self._file(part.first), json.dumps({**kept, "checksum": checksum}))
 
     def _file(self, first: int) -> Path:
-        return self._folder / f"chunk-{first:09d}.npz"
+        return self._folder / f"chunk-{first:09d}.json"
 
-    def _read(self) -> dict[str, Any]:
+    def _known(self) -> dict[str, Any]:
         """What the folder keeps; empty if nothing."""
+        path = self._folder / SWEEP
         try:
-            known = json.loads((self._folder / SWEEP).read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return {}
-        except ValueError:
-            known = None
-        if not isinstance(known, dict) or not isinstance(known.get("chunk"), int):
-            raise ValueError(f"{self._name} is damaged: its {SWEEP} is not one that was written here")
-        return known
+            known: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+            return {**known, "chunk": int(known["chunk"])} if known else {}
+        except (ValueError, KeyError, TypeError):
+            raise ValueError(f"{self.name} is damaged: its {SWEEP} is not one that was written here") from None
 
-    def _table(self, shape: tuple[int, ...]) -> Array:
+    def _table(self, shape: tuple[int, ...]) -> np.memmap[Any, np.dtype[np.float64]]:
         """The table, in its file. Raises ValueError for a file that was cut: a memory map would fill it with zeros."""
-        path, header, damaged = self._folder / ROWS, BytesIO(), f"{self._name} is damaged: its {ROWS}"
+        path, header, damaged = self._folder / ROWS, BytesIO(), f"{self.name} is damaged: "
         described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(header, described)
-        size, expected = path.stat().st_size, header.tell() + 8 * math.prod(shape)
-        if size != expected:
-            raise ValueError(f"{damaged} has {size} bytes, not {expected}; {AGAIN}")
-        try:
-            table: Array = np.load(path, mmap_mode="r+")
-        except ValueError:
-            raise ValueError(f"{damaged} is no table of NumPy; {AGAIN}") from None
-        if table.shape != shape:
-            raise ValueError(f"{damaged} has shape {table.shape}, not {shape}; {AGAIN}")
-        return table
+        size = header.tell() + 8 * math.prod(shape)
+        if not any(self._folder.glob("chunk-*")):
+            self._make_rows(header.getvalue(), size)
+        elif not path.exists():
+            raise ValueError(f"{damaged}it has results of chunks, and no {ROWS}")
+        with path.open("rb") as file:
+            if path.stat().st_size != size or file.read(header.tell()) != header.getvalue():
+                here = f"its {ROWS} of {path.stat().st_size} bytes is no table of NumPy of {shape}, of {size} bytes"
+                raise ValueError(f"{damaged}{here}; remove the folder, and the sweep begins anew")
+        return np.memmap(path, np.float64, "r+", header.tell(), shape)
 
-    def _make_rows(self, shape: tuple[int, ...]) -> None:
-        if any(self._folder.glob("chunk-*.npz")):
-            raise ValueError(f"{self._name} is damaged: it has results of chunks, and no {ROWS}")
-        size, free = 8 * math.prod(shape), shutil.disk_usage(self._folder).free
-        if size > free:  # a write through a memory map would end the process
-            needed = f"{shape[0]} trajectories of {shape[1]} rows of {shape[2]} numbers, and {free / 2**30:.3g} GiB"
-            raise OSError(
-                f"{self._name} needs {size / 2**30:.3g} GiB for {needed} are free: record fewer times (t_eval)"
-            )
-        made = self._folder / f".{ROWS}.{os.getpid()}.tmp"
+    def _make_rows(self, header: bytes, size: int) -> None:
+        """Make the file of the table, with all its room: a write through a memory map without would end the process."""
+        path, free = self._folder / ROWS, shutil.disk_usage(self._folder).free
         try:
-            np.lib.format.open_memmap(made, "w+", np.float64, shape=shape)
-            if hasattr(os, "posix_fallocate"):  # now, as nobody else may then take the room
-                with made.open("r+b") as file:
-                    os.posix_fallocate(file.fileno(), 0, made.stat().st_size)
+            if size > free:
+                raise OSError(errno.ENOSPC, f"{free / GIB:.3g} GiB are free")
+            with path.open("wb") as file:
+                file.write(header)
+                file.truncate(size)
+                if hasattr(os, "posix_fallocate"):  # now, as nobody else may then take the room
+                    os.posix_fallocate(file.fileno(), 0, size)
         except OSError as error:
-            made.unlink(missing_ok=True)
-            needs = f"needs a {ROWS} of {size / 2**30:.3g} GiB, which cannot be made"
-            raise OSError(error.errno, f"{self._name} {needs}: {error.strerror}") from None
-        made.replace(self._folder / ROWS)
+            path.unlink(missing_ok=True)
+            needs = f"{self.name} needs {size / GIB:.3g} GiB for its {ROWS}, fewer with fewer times (t_eval)"
+            raise OSError(error.errno, f"{needs}: {error.strerror}") from None
 
 
 def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json]:
-    """What makes a sweep the sweep that it is: equations, starts, parameters, options, and by which versions.
-
-    x, p: states (N, m) and parameters (N, ..) that the steps start from.
-    """
+    """What makes a sweep of states x (N, m) with parameters p (N, ..): equations, options, and by which versions."""
     program, options, watched = task.program, task.options, task.events.events if task.events else ()
     model = [problem.rate, problem.velocities, program.normalization]
     events = [graph for event in watched for graph in (event.values, event.reset)]
-    given = {
+    known = {
         "format": FORMAT,
         "cgraph": cg.__version__,
-        "llvmlite": _version("llvmlite"),
+        "llvmlite": [each.version for each in distributions(name="llvmlite")],
         "machine": platform.machine(),
-        **{name: getattr(options, name) for name in ("method", "backend", "fma", "estimate_error")},
-        **{name: getattr(options, name) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
-        "max_steps": None if options.max_steps == math.inf else options.max_steps,
+        **{field.name: getattr(options, field.name) for field in fields(options) if field.name != "progress"},
         "rtol": options.relative,
-        "atol": np.asarray(options.absolute, dtype=np.float64).tolist(),
-        "times": _digest(options.row_times.tobytes()),
-        "states": program.components,
-        "varied": problem.parameters,
+        "atol": np.asarray(options.absolute).tolist(),
+        "t_eval": _digest(options.row_times.tobytes()),
+        "names": [*program.components, *problem.parameters],
         "events": [f"{event.name} {event.direction} {event.terminal}" for event in watched],
         "model": _digest(*[cg.structure_hash(graph).encode() for graph in [*model, *events] if graph is not None]),
         "steps": _digest(*[cg.structure_hash(graph).encode() for graph in program.steps.graphs()]),
@@ -223,16 +176,9 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "starts": _digest(x.tobytes()),
         "parameters": _digest(p.tobytes()),
     }
-    sweep: dict[str, Json] = json.loads(json.dumps(given, default=float))
+    sweep: dict[str, Json] = json.loads(json.dumps(known, default=float))
     return sweep
 
 
 def _digest(*parts: bytes) -> str:
     return blake2b(b"".join(parts), digest_size=16).hexdigest()
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""

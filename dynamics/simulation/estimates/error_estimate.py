@@ -2,8 +2,7 @@
 
 With an error that is e = C h^p along the run, x(2h) - x(h) = (2^p - 1) e, and x(4h) - x(2h) is 2^p times as large; how
 much larger it is tells the order that the run has. Of steps that are not all equal, 2^p is the ratio of the sums of
-h^(p + 1). Across a jump or a kink of the rate these runs may be off alike, and what a step can miss there is the least
-that is said. This is the error of the state, phase included, not that of the energy.
+h^(p + 1). Across a jump or a kink of the rate all may be off alike, and the error is unknown.
 """
 
 from __future__ import annotations
@@ -11,13 +10,15 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from cgraph._shared import Array
+from cgraph import Graph, Node, floor, less, where
+from cgraph._shared import Array, kept_by_first
 
+from ...systems.arguments import TIME
 from ..run_options import RunOptions
 from ..stepper import EqualStepper, Stepper
 from ..steps.dense_output import StepBlock
@@ -30,9 +31,9 @@ from ..steps.equal_steps import (
     longer_steps,
     sampled_numbers,
 )
-from ..steps.state_sizes import Flags, off_by
+from ..steps.row_values import values_of
+from ..steps.state_sizes import off_by
 from ..steps.step_program import StepProgram
-from .unresolved import Watch
 
 APART_RATIO = 1.5  # the ratio of errors from which a difference of two runs tells them
 LEAST_RATIO = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
@@ -41,37 +42,29 @@ UNIT = 2.0**-52  # the last bit of a number near 1
 ASIDE = 1.0 + 8.0 * UNIT  # times each component, runs beside start: what roundings grow to is part of the error
 FOUR = 4  # steps, at whose ends those of all runs end
 LOOKS = 1024  # instants at which runs are compared, at most
-LATE, SHARE = 2.0, 0.1  # steps, or of the time between resets: runs parted for longer take other courses
 UNKNOWN = "the error is unknown"
-
-
-class Law(NamedTuple):
-    """How differences tell the error of a run whose longest step is so long [s].
-
-    share: of the first difference, that is error, if the error is a power of the step.  ratio: of the second difference
-    to the first then.
-    """
-
-    longest: float
-    share: float
-    ratio: float = 1.0
-
-
-def law_of_halves(longest: float, order: int) -> Law:
-    """The law if the run beside has steps of half the length."""
-    return Law(longest, 1.0 / (1.0 - 0.5**order))
+TOGETHER = 512  # states that are looked at once
+WAVES = ("sin", "cos", "tan")
+# Of an operation that jumps or has a kink a number that changes only there.
+BRANCHES: dict[str, Callable[..., Node]] = {
+    **dict.fromkeys(
+        ("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal"), lambda node, *args: node
+    ),
+    **dict.fromkeys(("minimum", "maximum"), lambda node, a, b: less(a, b)),
+    "abs": lambda node, a: less(a, 0.0),
+    "fmod": lambda node, a, b: where(less(a / b, 0.0), -floor(-(a / b)), floor(a / b)),
+}
 
 
 class RunsBeside(NamedTuple):
-    """Runs beside one of equal steps, which is looked at after so many of its steps, at instants t, (T,) each.
+    """Runs beside one of equal steps, the longest of which is so long [s], and how differences tell its error."""
 
-    runs: the steps of each, and how many are done then.
-    """
-
-    law: Law
-    runs: list[tuple[list[EqualSteps], Numbers]]
-    numbers: Numbers
-    t: Array
+    longest: float
+    share: float  # of the first difference that is error, if the error is a power of the step
+    ratio: float  # of the second difference to the first then; 1 without a second
+    runs: list[tuple[list[EqualSteps], Numbers]]  # the steps of each, and how many are done when they are compared
+    numbers: Numbers  # of its own steps that are done then, (T,)
+    t: Array  # (T,)
 
 
 def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
@@ -85,240 +78,162 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
         for each in (stretches, runs[0][0], runs[1][0])
     ]
     if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
-        return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
+        return RunsBeside(longest, one / (two - one), (four - two) / (two - one), runs, numbers, t)
+    numbers, share = sampled_numbers(steps, 1, LOOKS), 1.0 / (1.0 - 0.5**order)
     half = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
-    numbers = sampled_numbers(steps, 1, LOOKS)
-    return RunsBeside(law_of_halves(longest, order), [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
+    return RunsBeside(longest, share, 1.0, [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
 
 
-class Comparison(NamedTuple):
-    """States of k runs, and of those beside them, at instants t (T,).
+@kept_by_first
+def unresolved(rate: Graph) -> tuple[Graph | None, int]:
+    """Phases of waves in time, then branches, over the inputs of a rate; None if it has neither. How many phases."""
+    timed = {node for node in rate.inputs if node.name == TIME}
+    for node in rate.nodes:
+        if not timed.isdisjoint(node.args):
+            timed.add(node)
+    waves = dict.fromkeys(node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed)
+    branches = [BRANCHES[node.op.name](node, *node.args) for node in rate.nodes if node.op.name in BRANCHES]
+    found = [*waves, *branches]
+    return (Graph(rate.inputs, {f"y{k}": node for k, node in enumerate(found)}) if found else None), len(waves)
 
-    rows: (k, T, m) each, not finite where a run has stopped.  alike: of each and the next, which rows can be compared;
-    all by default.  lost: when one takes another course.
-    """
 
-    t: Array
-    rows: Sequence[Array]
-    alike: Sequence[Flags] = ()
-    lost: float = math.nan
+class Watch:
+    """What steps of k runs side by side, from x (k, m) at t with parameters p (k, ..), do not resolve."""
+
+    def __init__(self, rate: Graph, p: Array, t: float, x: Array) -> None:
+        self._graph, self._waves = unresolved(rate)
+        self.turning = np.zeros(len(x))  # of the fastest sines and cosines [rad/s]
+        self.bent = np.full(len(x), np.nan)  # start of the first step that passes a jump or a kink [s]
+        self._p, self._seen = p, [(np.array([t]), x[:, None])]
+
+    def add(self, t: Array, x: Array) -> None:
+        """The next states, (k, r, m), at times t (r,)."""
+        if self._graph is not None:
+            self._seen.append((t, x))
+            if sum([len(times) for times, _ in self._seen]) > TOGETHER:
+                self.look()
+
+    def look(self) -> None:
+        """Look at what has come."""
+        if self._graph is None or len(self._seen) == 1:
+            return
+        t, x = np.concatenate([t for t, _ in self._seen]), np.concatenate([x for _, x in self._seen], axis=1)
+        self._seen = [(t[-1:], x[:, -1:])]
+        columns = [*np.moveaxis(x, -1, 0), t, *np.moveaxis(self._p[:, None], -1, 0)]
+        change = np.abs(np.diff(values_of(self._graph, columns, *x.shape[:-1])))
+        speeds = change[: self._waves] / np.abs(np.diff(t))
+        self.turning = np.maximum(self.turning, speeds.max(axis=(0, 2), initial=0.0))
+        passes = (change[self._waves :] != 0.0).any(axis=0)
+        first = np.where(passes.any(axis=1), t[passes.argmax(axis=1)], np.nan)
+        self.bent = np.where(np.isnan(self.bent), first, self.bent)
 
 
 def error_estimates(
-    program: StepProgram, options: RunOptions, law: Law, watch: Watch, steps: int, compared: Comparison
+    program: StepProgram, options: RunOptions, beside: RunsBeside, watch: Watch, steps: int, rows: Sequence[Array]
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
-    The errors are relative to the sizes of components, NaN if nothing was compared, and infinite if unknown.
+    rows: states of the runs, and of those beside, (k, T, m) each; not finite where a run has stopped.
     """
-    t, rows, alike, lost = compared
-    many, warnings = len(rows[0]), np.zeros(len(rows[0]), dtype=np.object_)
-    warnings.fill(())
-    if len(rows) == 1:
-        return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
     watch.look()
-    between = [other - one for one, other in itertools.pairwise(rows)]
-    for k, each in enumerate(between):
+    apart = [other - one for one, other in itertools.pairwise(rows)]
+    for each in apart:
         np.abs(each, out=each)
-        if alike:
-            each[:, ~alike[k]] = 0.0
-    at_end = int(np.flatnonzero(alike[0])[-1]) if alike else -1
     scale = program.kinds.scale(np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)))
-    peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in between]]
-    since = np.full(many, lost)
+    peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in apart]]
+    since, warnings = np.full(len(scale), math.nan), np.empty(len(scale), dtype=np.object_)
+    warnings.fill(())
     for k in np.flatnonzero(np.isinf(peaks[0]).any(axis=1)).tolist():
-        since[k] = t[np.argmin(np.isfinite(between[0][k]).all(axis=1))]
+        since[k] = beside.t[np.argmin(np.isfinite(apart[0][k]).all(axis=1))]
     with np.errstate(all="ignore"):
         measured = peaks[-1] / peaks[0]
-        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], between[0][:, at_end], watch.missed)]
-    least = np.maximum(shares[2], UNIT * math.sqrt(steps))
-    largest, last = [np.maximum(least, _errors(each, measured, law, watch.bent)) for each in shares[:2]]
+        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], apart[0][:, -1])]
+    largest, last = [np.maximum(UNIT * math.sqrt(steps), _errors(each, measured, beside)) for each in shares]
     largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
-    resolved = math.pi * max(1.0, 0.5 * program.order) / law.longest  # rad/s: two evaluations in a turn
-    for unseen in (watch.turning > resolved, ~np.isnan(since)):
-        largest[unseen] = last[unseen] = math.inf
+    resolved = math.pi * max(1.0, 0.5 * program.order) / beside.longest  # rad/s: two evaluations in a turn
+    unknown = (watch.turning > resolved) | ~np.isnan(since) | ~np.isnan(watch.bent)
+    largest[unknown] = last[unknown] = math.inf
     allowed = options.absolute + options.relative * scale
     for k in np.flatnonzero(~(largest * scale <= allowed).all(axis=1)).tolist():
+        how = f"a dt shorter than {options.step:g} s, or method='dop853', which chooses its steps"
+        how = f"; rtol = {options.relative:g} allows less: take {how}"
         if watch.turning[k] > resolved:
-            said = (
-                f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
-                f"{law.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
-            )
+            said = f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
+            said += f"{beside.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
+        elif not math.isnan(watch.bent[k]):
+            said = f"{UNKNOWN} from t = {watch.bent[k]:.6g} s on: the rate has a jump or a kink there"
+            how = ": take method='dop853', which finds its way across"
         elif not math.isnan(since[k]):
-            at = f"t = {since[k]:.6g} s"
-            said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
+            said = f"{UNKNOWN}: beside it a run of other steps stops at t = {since[k]:.6g} s"
         else:
             said = off_by(largest[k], scale[k], allowed[k], program.components)
-        how = f"a dt shorter than {options.step:g} s, or method='dop853', which chooses its steps"
-        warnings[k] = (f"{said}; rtol = {options.relative:g} allows less: take {how}",)
+        warnings[k] = (f"{said}{how}",)
     return {"error": largest.max(axis=1), "error_at_end": last.max(axis=1), "warnings": warnings}
 
 
-def _errors(first: Array, measured: Array, law: Law, bent: Flags) -> Array:
-    """Errors of components, (k, m), from the first difference and by how much the second is larger.
-
-    The law of the method holds if these have the ratio that goes with it, and that of another order if it is lower.
-    Across a kink it depends on where in a step that is: no ratio tells.
-    """
-    if law.ratio == 1.0:
-        return first * law.share
-    least = min(LEAST_RATIO, law.ratio)
-    clipped = np.where(np.isfinite(measured), np.clip(measured, least, law.ratio), least)
-    by_law = first * law.share * (law.ratio - 1.0) / (clipped - 1.0)
-    return np.where((first <= LAWLESS) & ~bent[:, None], by_law, first)
-
-
-class RunEstimate:
-    """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them."""
-
-    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
-        self._run, self._x, self._options = run, x, options
-        self._compared: _Whole | _Periods | None = None
-        self.seconds = 0.0  # spent here
-
-    def add(self, block: StepBlock) -> None:
-        """The next steps of the run, or a reset."""
-        if not self._options.estimated or not len(block.t):
-            return
-        begin, run = time.perf_counter(), self._run
-        assert isinstance(run, EqualStepper)
-        if self._compared is None:
-            p, program = np.array([run.parameters]), run.program
-            self._watch = Watch(program.rate, program.order, p, self._options.t0, self._x[None])
-            if run.control is None:
-                self._compared = _Whole(run, self._x, self._options)
-            else:
-                self._compared = _Periods(run, self._x, self._options.t0, self._watch)
-        if block.h[0] == 0.0:
-            self._watch.restart(float(block.t[0]), block.x)
-        else:
-            self._compared.add(block)
-            self._watch.add(block.t, block.x[None])
-        self.seconds += time.perf_counter() - begin
-
-    def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
-        """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
-        if self._compared is None:
-            return None, None, ()
-        begin, program = time.perf_counter(), self._run.program
-        law, compared = self._compared.comparison(self._run.largest, program.order)
-        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, compared)
-        error, last, said = [column[0] for column in columns.values()]
-        self.seconds += time.perf_counter() - begin
-        return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
+def _errors(first: Array, measured: Array, beside: RunsBeside) -> Array:
+    """Errors of components, (k, m), from the first difference and how much the second is larger: the order it has."""
+    if beside.ratio == 1.0:
+        return first * beside.share
+    least = min(LEAST_RATIO, beside.ratio)
+    clipped = np.where(np.isfinite(measured), np.clip(measured, least, beside.ratio), least)
+    by_law = first * beside.share * (beside.ratio - 1.0) / (clipped - 1.0)
+    return np.where(first <= LAWLESS, by_law, first)
 
 
 class _Rows:
-    """States (T, m) of a run that starts with x, at instants t (T,), and how many resets it has had.
-
-    count: of the instants that it has come to; beyond the states are NaN.
-    """
+    """States (T, m) of a run that starts with x, at instants t (T,)."""
 
     def __init__(self, t: Array, x: Array) -> None:
-        self.t, self.x, self.resets, self.count = t, np.full((len(t), len(x)), math.nan), np.zeros(len(t)), 1
-        self.x[0], self._forth = x, np.sign(t[-1] - t[0])
+        self.x, self._forth = np.full((len(t), len(x)), math.nan), np.sign(t[-1] - t[0])
+        self.x[0], self.count = x, 1  # of the instants that it has come to
         self._times = self._forth * t - SAME_INSTANT * np.spacing(np.abs(t).max())  # for those at which steps end
 
-    def add(self, block: StepBlock, resets: int) -> None:
-        """The next steps, before which it had so many resets."""
+    def add(self, block: StepBlock) -> None:
+        """The next steps."""
         ends = self._forth * block.t
         here = slice(self.count, int(np.searchsorted(self._times, ends[-1], side="right")))
-        if block.dense is None:
-            self.x[here] = block.x[np.searchsorted(ends, self._times[here])]
-        else:
-            self.x[here] = block.at(self._forth * np.minimum(self._forth * self.t[here], ends[-1]))
-        self.resets[here], self.count = resets, max(self.count, here.stop)
+        self.x[here] = block.x[np.searchsorted(ends, self._times[here])]
+        self.count = max(self.count, here.stop)
 
 
-class _Whole:
-    """A run and runs beside it that go all the way, at instants at which steps of all end.
+class RunEstimate:
+    """Estimate of the error of a run from its blocks as they come, if it is to be estimated."""
 
-    Runs with resets have these at other times, and are compared by their dense output where both have had as many.
-    """
-
-    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
-        self._run, self._x, stretches = run, x, equal_steps(options.instants, options.step)
-        self._resetting = run.log is not None and run.log.resetting
-        if self._resetting:
-            stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
-        self._beside = runs_beside(stretches, run.program.order)
-        self._rows = _Rows(self._beside.t, x)
+    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
+        self._run, self._x, self._options, self.seconds = run, x, options, 0.0  # spent here
+        self._rows: _Rows | None = None
+        resetting = run.log is not None and run.log.resetting
+        if isinstance(run, EqualStepper) and options.estimated and run.control is None and not resetting:
+            begin = time.perf_counter()
+            self._beside = runs_beside(equal_steps(options.instants, options.step), run.program.order)
+            self._rows = _Rows(self._beside.t, x)
+            self._watch = Watch(run.program.rate, np.array([run.parameters]), options.t0, x[None])
+            self.seconds = time.perf_counter() - begin
 
     def add(self, block: StepBlock) -> None:
         """The next steps of the run."""
-        self._rows.add(block, self._run.resets)
+        if self._rows is not None and len(block.t):
+            begin = time.perf_counter()
+            self._rows.add(block)
+            self._watch.add(block.t, block.x[None])
+            self.seconds += time.perf_counter() - begin
 
-    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
-        """What the runs beside tell, after the last step."""
-        one, law = self._rows, self._beside.law
-        t = one.t[: one.count]
-        rows, alike = [one.x[None, : len(t)]], list[Flags]()
-        for stretches, _ in self._beside.runs if len(t) > 1 else ():
-            if self._resetting:
-                run = self._run.again(max([abs(part.h) for part in stretches]))
-            else:
-                run = self._run.beside(stretches, self._run.parameters)
-            other = _Rows(t, self._x)
-            for block in run.blocks(self._x * ASIDE):
-                if block.h[0] != 0.0:
-                    other.add(block, run.resets)
-                if other.count == len(t):
+    def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
+        """After the last step: the largest error and that at the end, None if not estimated, and a warning of it."""
+        if self._rows is None or self._rows.count == 1:
+            return None, None, ()
+        begin, run, beside, count = time.perf_counter(), self._run, self._beside, self._rows.count
+        assert isinstance(run, EqualStepper)
+        rows = [self._rows.x[None, :count]]
+        for stretches, _ in beside.runs:
+            other = _Rows(beside.t[:count], self._x)
+            for block in run.beside(stretches, run.parameters).blocks(self._x * ASIDE):
+                other.add(block)
+                if other.count == count:
                     break
-            if run.event:  # which has ended it before the other
-                other.resets[other.count :] = math.inf
             rows.append(other.x[None])
-            alike.append(one.resets[: len(t)] == other.resets)
-            one = other
-        lost = _parting_time(t, alike[0], law.longest, self._run.resets) if alike else math.nan
-        return law, Comparison(t, rows, alike, lost)
-
-
-def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
-    """When runs with so many resets have other ones for longer than their steps explain; NaN if they have not."""
-    begins, ends = np.flatnonzero(np.diff(~alike, prepend=False, append=False)).reshape(-1, 2).T
-    late = max(LATE * longest, SHARE * abs(t[-1] - t[0]) / (1 + resets))
-    apart = np.flatnonzero((np.abs(t[ends - 1] - t[begins]) > late) | (2 * alike.sum() < len(t)))
-    return float(t[begins[apart[0]]]) if len(apart) else math.nan
-
-
-class _Periods:
-    """Differences of a run's stretches of steps under the same forces of a controller, each compared by itself.
-
-    These forces answer the states of the run, and would be others beside it: from where the run is, steps of half the
-    length are made under the same. The differences add up.
-    """
-
-    _stretch: EqualSteps  # of which so many steps are done
-
-    def __init__(self, run: EqualStepper, x: Array, t0: float, watch: Watch) -> None:
-        self._run = run
-        self._watch, self._t0, self._since, self._steps = watch, t0, math.inf, 0
-        self._size, self._sum = np.abs(x), np.zeros(len(x))
-
-    def add(self, block: StepBlock) -> None:
-        """The next steps of the run."""
-        if not self._steps or self._run.stretch is not self._stretch:
-            self._compare()
-            self._stretch, self._forces = self._run.stretch, self._run.parameters
-            self._start, self._steps = block.x_old[0], 0
-            self._watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
-        self._size = np.maximum(self._size, np.abs(block.x).max(axis=0))
-        self._steps, self._t, self._end = self._steps + len(block.t), float(block.t[-1]), block.x[-1]
-
-    def _compare(self) -> None:
-        """Add the difference of the stretch, as far as it went."""
-        if not self._steps:
-            return
-        begin, steps, end = self._stretch.begin, 2 * self._steps, self._start
-        run = self._run.beside([EqualSteps(begin, (self._t - begin) / steps, steps, self._t)], self._forces)
-        for block in run.blocks(self._start):
-            end = block.x[-1]
-        self._sum = self._sum + (math.nan if run.status else np.abs(end - self._end))
-        if not np.isfinite(self._sum).all():
-            self._since = min(self._since, self._t)
-
-    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
-        """What the differences tell, after the last step, as those of two rows."""
-        self._compare()
-        rows = [np.array([[self._size] * 2]), np.array([[self._size, self._size + self._sum]])]
-        return law_of_halves(longest, order), Comparison(np.array([self._t0, self._since]), rows)
+        columns = error_estimates(run.program, self._options, beside, self._watch, run.steps, rows)
+        error, last, said = [column[0] for column in columns.values()]
+        self.seconds += time.perf_counter() - begin
+        return float(error), float(last), said

@@ -26,16 +26,11 @@ ROUNDINGS = 8.0  # that the interpolation of a state, and the sum of a motion, m
 class Event(HoldsNodes):
     """Event: a quantity that passes through zero, and what happens there.
 
-    A quantity that touches zero and turns back counts too, with direction 0, where its extremum is zero to the rounding
-    of its evaluation. One that stays zero for a while has one event, where it arrives; one that starts there has none
-    before it comes back, but for one with a reset and a direction, a contact: it happens there if it closes. Of events
-    at one instant those without a reset are first; then one reset follows another, the first in the list that is due
-    after the last: what is zero and moves in its direction. What another reset has turned back is not; contacts that
-    rest are, once another reset closes them. A jump by a reset is no crossing.
-
-    Value and slope of the quantity are looked at sixteen times in each step, and as often more as it takes until the
-    cubics between looks agree with them, at most 1024 times. Where that is too few, `Stats.warnings` says so: limit the
-    steps by `max_step` or `dt`.
+    What touches zero and turns back counts too, with direction 0. What stays zero for a while has one event, where it
+    arrives; what starts there has none before it comes back, but for a contact, with a reset and a direction, if it
+    closes. Of events at one instant those without a reset are first; then the first reset in the list that is due,
+    again and again: what is zero and moves in its direction. A jump by a reset is no crossing. The quantity is looked
+    at 16 to 1024 times in a step; where that is too few, `Stats.warnings` says so: take a shorter `max_step` or `dt`.
 
     Parameters
     ----------
@@ -50,11 +45,9 @@ class Event(HoldsNodes):
         Whether the run ends there.
     reset : callable, optional
         The state from which the run goes on, reset(q, qd, t) or reset(q, qd, t, p) -> (q, qd) as nodes or numbers; of
-        an OdeSystem reset(x, t) or reset(x, t, p) -> x. Quaternions in q are brought to length 1. Both states are rows
-        of the trajectory, at the same instant, the first and the last of several resets there; at a time of `t_eval`,
-        the one before is. Where they follow one another in no time, as the bounces of a ball that comes to rest do, the
-        run stops and says so. Without a direction, a reset that starts at zero does not know its side: how it leaves
-        from there by itself resets nothing, and a warning says so.
+        an OdeSystem reset(x, t) or reset(x, t, p) -> x. Both states are rows of the trajectory, the first and the last
+        of several resets at an instant; at a time of `t_eval`, the one before is. A run whose resets follow one another
+        in no time stops. What starts at zero needs a direction, to know its side; a warning says so.
 
     Raises
     ------
@@ -82,76 +75,57 @@ class Event(HoldsNodes):
     reset: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.name, str) or not _is_function(self.value) or not isinstance(self.terminal, bool):
-            raise TypeError(
-                "an event needs a name, a function, and True or False for `terminal`, got "
-                f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
-            )
+        is_function = [callable(each) and not isinstance(each, type) for each in (self.value, self.reset)]
+        if not isinstance(self.name, str) or not is_function[0] or not isinstance(self.terminal, bool):
+            got = f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
+            raise TypeError(f"an event needs a name, a function, and True or False for `terminal`, got {got}")
         check_name("an event", self.name)
         if not isinstance(self.direction, (int, np.integer)) or self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
-        if self.reset is not None and not _is_function(self.reset):
+        if self.reset is not None and not is_function[1]:
             raise TypeError(f"event {self.name!r}: reset must be a function, got {self.reset!r:.40}")
         if self.reset is not None and self.terminal:
             raise ValueError(f"event {self.name!r}: a run that ends there goes on from no reset state; leave out one")
 
 
-def _is_function(value: object) -> bool:
-    return callable(value) and not isinstance(value, type)
-
-
 def as_events(events: Event | Iterable[Event]) -> tuple[Event, ...]:
     """One event or several, as a tuple. Raises TypeError for anything else, ValueError for two of one name."""
     several = (events,) if isinstance(events, Event) else tuple(sequence("events must be", events))
-    names = set()
-    for event in several:
+    for k, event in enumerate(several):
         if not isinstance(event, Event):
             raise TypeError(f"events must be of the type Event, got {type(event).__name__}: {event!r:.60}")
-        if event.name in names:
+        if event.name in [other.name for other in several[:k]]:
             raise ValueError(f"two events have the name {event.name!r}")
-        names.add(event.name)
     return several
 
 
 @dataclass(frozen=True, eq=False)
 class WatchedEvent:
-    """Event as its location reads it, with its quantity g over the states x, t and parameters p as graphs.
-
-    values: g.  slopes: g_dot, with the tangents of x and t for inputs besides.  errors: a bound of the rounding of g,
-    with the errors of x and t for inputs besides.  reset: the state after it, if it changes.
-    """
+    """Event as graphs over states x, t and parameters p: of its quantity g, and of the state after it."""
 
     name: str
     direction: int
     terminal: bool
     values: Graph
-    slopes: Graph
-    errors: Graph
+    slopes: Graph  # of g, with the tangents of x and t for inputs besides
+    errors: Graph  # a bound of the rounding of g, with the errors of x and t for inputs besides
     reset: Graph | None
 
     def counts(self, side: float, *, touching: bool = False) -> bool:
         """Whether a crossing from a side, a sign, or a touch, is one of the event."""
         return self.direction == 0 or (self.direction * side < 0.0 and not touching)
 
-    def value(self, t: Array, x: Array, p: Sequence[float]) -> Array:
-        """g, (k,), at times (k,) and states (k, m)."""
-        g: Array = values_of(self.values, [*x.T, t, *p], len(t))[0]
-        return g
 
-    def slope(self, t: Array, x: Array, p: Sequence[float], x_dot: Array, t_dot: Array) -> Array:
-        """The derivative of g, (k,), where x and t have the derivatives x_dot (k, m) and t_dot (k,)."""
-        g: Array = values_of(self.slopes, [*x.T, t, *p, *x_dot.T, t_dot], len(t))[0]
-        return g
-
-    def error(self, t: Array, x: Array, p: Sequence[float], x_error: Array, t_error: Array) -> Array:
-        """Errors of g, (k,), from some roundings, where x and t are off by x_error (k, m) and t_error (k,)."""
-        g: Array = values_of(self.errors, [*x.T, t, *p, *x_error.T, t_error], len(t))[0]
-        return ROUNDINGS * g
+def numbers_of(graph: Graph, t: Array, x: Array, p: Sequence[float], *more: Array) -> Array:
+    """The output, (k,), at times (k,), states (k, m) and parameters, with tangents or errors of states and times."""
+    columns = [*x.T, t, *p, *[column for each in more for column in np.atleast_2d(each.T)]]
+    numbers: Array = values_of(graph, columns, len(t))[0]
+    return numbers
 
 
 @dataclass(frozen=True, eq=False)
 class EventProgram:
-    """The events of a run, and of its states the names of the components, the rate, and the velocities, see Problem."""
+    """The events of a run, and of its states the names of the components, the rate and the velocities."""
 
     events: tuple[WatchedEvent, ...]
     components: tuple[str, ...]
@@ -198,10 +172,7 @@ def _reset(problem: Problem, what: str, function: Callable[..., Any]) -> Graph:
 
 
 def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
-    """The outputs' rounding, to first order, from errors of the inputs: a running bound, node by node.
-
-    An error passes on through the local partials, in absolute value, and each operation adds its own.
-    """
+    """The outputs' rounding, to first order, from errors of the inputs, node by node: |partials| times errors."""
     leaves, zero = new_variables("error", len(inputs), graph.input_names), cg.constant(0.0)
     errors: dict[Node, Node] = dict(zip(inputs, leaves, strict=True))
     with building(Builder()):
@@ -213,5 +184,4 @@ def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
                 if (error := errors[arg]).value != 0.0:
                     total = total + abs(partial) * error
             errors[node] = total
-    outputs = {name: errors[node] for name, node in graph.outputs.items()}
-    return Graph([*graph.inputs, *leaves], outputs)
+    return Graph([*graph.inputs, *leaves], {name: ROUNDINGS * errors[node] for name, node in graph.outputs.items()})

@@ -1,10 +1,11 @@
-"""EventLog: the events of a run, block by block, and what they reset."""
+"""EventLog: the events of a run, where quantities are zero, by bounds on cells of steps, and what events reset."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,26 +13,288 @@ import numpy as np
 from cgraph._shared import Array
 
 from ...integrators.step_control import RESOLUTION
-from ..steps.dense_output import UNIT, StepBlock
+from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags
-from .crossings import MOST_CELLS, Crossing, Side, WatchedSteps, crossings
-from .event import EventProgram
+from .event import EventProgram, WatchedEvent, numbers_of
 
+CELLS = 8  # of a step before the first split, so that it is looked at sixteen times at least
+NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(CELLS + 1) / CELLS)  # not evenly spaced: no oscillation hides between them
+MOST_CELLS = 1024  # cells of a step
+COARSER = 8.0  # than a neighbor a cell may not be: it would agree by chance
+SHORTEST = 2.0**-48  # of a step, a cell
+DECAY = 16.0  # of what a cubic misses, from a cell to its halves
+MARGIN = 12.0  # by which a cubic has to tell more than it misses
+PARTS, TOGETHER = 32, 8192  # into which a cell is divided again and again, and those of all cells together
+WHILE = 2.0**-20  # of a step
+SMALL = 2.0**-10  # of what a quantity is in a cell: an end that is less may be zero to rounding
+BITS = 56.0  # of where in a cell
 STEPS = 512  # looked at together
 ROUNDED = 3.0  # times a state, until it is read: at both ends of a step and between
 AT_ONCE = 32  # restarts of the run in a row, at one instant or of contacts that rest
 RESETS = 10_000  # one after another before a restart: more than bodies that touch need to come apart
-MISSED = (
-    "may have been missed, first after t = {:.6g} s: its quantity turns too often for "
-    f"{MOST_CELLS} looks in a step; shorter steps (max_step or dt) find all"
-)
-UNSIDED = (
-    "starts at zero and leaves it at t = {:.6g} s, where nothing is reset: it has no direction, which would tell on "
-    "which side it starts"
-)
+MISSED = "may have been missed, first after t = {:.6g} s; shorter steps (max_step or dt) find all"
+UNSIDED = "starts at zero and leaves it at t = {:.6g} s, where nothing is reset: it needs a direction, to know its side"
 
 Happening = tuple[int, float, Array]  # number of the event, time, state
+
+
+class Crossing(NamedTuple):
+    """Crossing of zero by a quantity."""
+
+    row: int  # of the step
+    s: float  # share of the step
+    side: float  # the sign with which it comes; 0 of one that has none, and leaves zero
+    touching: bool  # whether it turns back
+    resting: bool = False  # whether it was at rest there, and leaves
+
+
+@dataclass
+class Side:
+    """Side of zero on which a quantity is, between one part of a run and the next."""
+
+    sign: float = 0.0  # its last, 0 before it has one; at rest on zero that of the side that it belongs to, if any
+    slope: float = math.nan  # at the end of the last step
+    leaving: bool = False  # whether it starts on zero and moves to this side
+    resting: bool = False  # whether it has been zero, to rounding, since the start or the last reset
+    waiting: bool = False  # whether it is zero at the last instant: the next step tells what it does there
+
+
+class WatchedSteps(NamedTuple):
+    """Steps with dense output, and the quantity of an event at shares s, (k,) or (k, parts), of rows (k,)."""
+
+    event: WatchedEvent
+    parameters: Sequence[float]
+    block: StepBlock
+    noise: float = 0.0  # what the rounding of the quantity is at least
+
+    def _points(self, rows: Indices, s: Array) -> tuple[Indices, Array, Array, Array]:
+        rows, s = np.repeat(rows, s.size // max(1, len(rows))), s.ravel()
+        return rows, s, self.block.times_at(rows, s), self.block.states_at(rows, s)
+
+    def values(self, rows: Indices, s: Array) -> Array:
+        """The quantity."""
+        _, _, t, x = self._points(rows, s)
+        return numbers_of(self.event.values, t, x, self.parameters).reshape(s.shape)
+
+    def slopes(self, rows: Indices, s: Array) -> Array:
+        """Its derivatives by the share of the step."""
+        rows, shares, t, x = self._points(rows, s)
+        x_dot, t_dot = self.block.slopes_at(rows, shares), self.block.h[rows]
+        return numbers_of(self.event.slopes, t, x, self.parameters, x_dot, t_dot).reshape(s.shape)
+
+    def rounding(self, rows: Indices, s: Array) -> Array:
+        """Rounding errors of its values."""
+        rows, _, t, x = self._points(rows, s)
+        error = numbers_of(self.event.errors, t, x, self.parameters, *self.block.rounding(rows, t, x))
+        return np.maximum(self.noise, error).reshape(s.shape)
+
+
+class Cells(NamedTuple):
+    """Parts of steps, from share a to share b, with values and slopes of a quantity at both, (k,) each."""
+
+    rows: Indices
+    a: Array
+    b: Array
+    g_a: Array
+    g_b: Array
+    slope_a: Array
+    slope_b: Array
+    miss: Array  # an estimate of how far the cubic through both ends is off
+    rounding: Array
+
+    def take(self, which: Flags | Indices) -> Cells:
+        """Subset of the cells."""
+        return Cells._make([array[which] for array in self])
+
+    def replaced(self, split: Flags, *halves: Cells) -> Cells:
+        """The cells with left and right parts in place of those of `split`, in order."""
+        cells = Cells._make([np.concatenate(parts) for parts in zip(self.take(~split), *halves, strict=True)])
+        return cells.take(np.lexsort((cells.a, cells.rows)))
+
+    def beside(self, extreme: Callable[[Array, Array], Array], values: Array) -> Array:
+        """Smallest or largest of a cell's value and its neighbors'."""
+        result = values.copy()
+        left = np.flatnonzero((self.rows[:-1] == self.rows[1:]) & (self.b[:-1] == self.a[1:]))
+        result[left] = extreme(result[left], values[left + 1])
+        result[left + 1] = extreme(result[left + 1], values[left])
+        return result
+
+    def control_points(self) -> Array:
+        """Control points, (4, k), of the cubics through values and slopes at the ends, which their hull contains."""
+        third = (self.b - self.a) / 3.0
+        return np.stack([self.g_a, self.g_a + self.slope_a * third, self.g_b - self.slope_b * third, self.g_b])
+
+    def clear(self) -> Flags:
+        """Whether the quantity cannot be zero there, (k,)."""
+        # It stays in the hull of the control points, and where it turns, as |x| may do at once, also on this side of
+        # the point where the tangents at the ends meet.
+        points, sign = self.control_points(), np.sign(self.g_a)
+        hull = (points * sign > MARGIN * self.miss).all(axis=0)
+        turns = (self.slope_a * sign < 0.0) & (self.slope_b * sign > 0.0)
+        bend = np.where(turns, self.slope_b - self.slope_a, 1.0)
+        meet = self.g_a + self.slope_a * (self.slope_b * (self.b - self.a) - (self.g_b - self.g_a)) / bend
+        clear: Flags = hull & ~(turns & (meet * sign <= MARGIN * self.miss))
+        return clear
+
+    def resolved(self) -> Flags:
+        """Whether the ends tell how often it is zero, (k,): not, everywhere, or nothing can be told of what is NaN."""
+        points, margin = self.control_points(), MARGIN * self.miss
+        zero, none = np.abs(points).max(axis=0) <= 2.0 * self.rounding, ~np.isfinite(points).all(axis=0)
+        told: Flags = self.clear() | zero | none
+        for order in (1, 2):  # or it is monotone, or its slope is, so that it has one extremum
+            differences = np.diff(points, order, axis=0)
+            told |= (differences > margin).all(axis=0) | (differences < -margin).all(axis=0)
+        return told
+
+
+def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
+    """The cells of all steps in order, and for which steps, (steps,), `MOST_CELLS` were too few."""
+    count = len(steps.block.t)
+    rows, s = np.arange(count), np.tile(NODES, (count, 1))
+    ends = [(each[:, :-1].ravel(), each[:, 1:].ravel()) for each in (s, steps.values(rows, s), steps.slopes(rows, s))]
+    none = np.zeros(CELLS * count)
+    cells = Cells._make([np.repeat(rows, CELLS), *[end for pair in ends for end in pair], none, none])
+    cells = cells.replaced(none == 0.0, *_halves(steps, cells, bounded=False))
+    worst = cells.miss.reshape(count, 2 * CELLS).max(axis=1)
+    cells = cells._replace(miss=np.maximum(cells.miss, worst[cells.rows] / DECAY))
+    beyond = np.zeros(count, dtype=bool)
+    while True:
+        width = cells.b - cells.a
+        unresolved = ~cells.resolved() & (width > SHORTEST)
+        split = unresolved | (cells.beside(np.minimum, width) * COARSER < width)
+        size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[split], minlength=count)
+        late = (size > MOST_CELLS)[cells.rows]
+        beyond[cells.rows[unresolved & late]] = True
+        split &= ~late
+        if not split.any():
+            return cells, beyond
+        cells = cells.replaced(split, *_halves(steps, cells.take(split), bounded=True))
+
+
+def _halves(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> tuple[Cells, Cells]:
+    """Halves of cells; how far their cubics miss is told by value and slope in the middle. bounded: with rounding."""
+    width = cells.b - cells.a
+    middle = cells.a + 0.5 * width
+    g, slope = steps.values(cells.rows, middle), steps.slopes(cells.rows, middle)
+    g_off = g - 0.5 * (cells.g_a + cells.g_b) - 0.125 * width * (cells.slope_a - cells.slope_b)
+    slope_off = width * (slope + 0.25 * (cells.slope_a + cells.slope_b)) - 1.5 * (cells.g_b - cells.g_a)
+    off = np.maximum(np.abs(g_off), 0.25 * np.abs(slope_off))
+    wide = 4.0 * cells.beside(np.maximum, cells.beside(np.maximum, off))  # one that is far off may agree by chance
+    miss = np.maximum(wide, cells.miss) / DECAY
+    rounding = steps.rounding(cells.rows, middle) if bounded else cells.rounding
+    halves = cells._replace(miss=miss, rounding=rounding)
+    return halves._replace(b=middle, g_b=g, slope_b=slope), halves._replace(a=middle, g_a=g, slope_a=slope)
+
+
+def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
+    """Crossings in these steps, and flags of (steps,) in which more may have happened; moves `side` on."""
+    # Touching is an extremum that is zero to rounding. What stays zero arrives once; what rests and leaves to the other
+    # side than its own crosses zero where it leaves.
+    cells, beyond = event_cells(steps)
+    # where steps meet, the slope is that at the end of the step before: a turn counts once
+    first = np.flatnonzero(np.diff(cells.rows)) + 1
+    cells.slope_a[first] = cells.slope_b[first - 1]
+    if not math.isnan(side.slope):
+        cells.slope_a[0] = side.slope
+    side.slope = float(cells.slope_b[-1])
+    cells, extrema = _at_extrema(steps, cells)
+    rows, s = np.concatenate([cells.rows[:1], cells.rows]), np.concatenate([cells.a[:1], cells.b])  # of looks
+    g = np.concatenate([cells.g_a[:1], cells.g_b])
+    # the sign before the first look, and those at looks; 0 of a quantity at zero
+    signs = np.nan_to_num(np.sign(np.append(side.sign, g)))
+    zero = g == 0.0
+    zero[0] |= side.leaving or side.resting
+    beside = np.concatenate([np.flatnonzero(signs[:-1] * signs[1:] < 0.0), extrema])
+    _add_rounded_zeros(zero, beside, lambda looks: np.abs(g[looks]) <= steps.rounding(rows[looks], s[looks]))
+    signs[1:][zero] = 0.0
+    if side.leaving:
+        signs[1], side.leaving = side.sign, False
+    found, arrivals = list[Crossing](), list[int]()
+
+    def stays(begin: int, end: int) -> bool:
+        """Whether the quantity is exactly zero for a while, not only at looks that lie side by side at a touch."""
+        zeros = begin + np.flatnonzero(g[begin:end] == 0.0)
+        place = rows[zeros] + s[zeros]
+        return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
+
+    known = np.flatnonzero(signs)
+    known = known[known > 0] if side.resting else known
+    if not len(known):
+        return [], beyond
+    if side.resting:
+        side.resting, look = False, max(int(known[0]) - 2, 0)
+        if side.sign != signs[known[0]]:
+            found.append(Crossing(int(rows[look]), float(s[look]), side.sign, touching=False, resting=True))
+    here, there, last = known[:-1], known[1:], int(known[-1])
+    turns = np.flatnonzero((signs[here] != signs[there]) | (there > here + 1))
+    for i, j in zip(here[turns].tolist(), there[turns].tolist(), strict=True):
+        if signs[i] != signs[j] or stays(i, j - 1):
+            arrivals.append(i)
+        else:
+            between = [look for look in extrema.tolist() if i <= look < j - 1]
+            look = between[0] if between else (i + j - 2) // 2
+            found.append(Crossing(int(rows[look]), float(s[look]), float(signs[i]), touching=True))
+    side.sign = float(signs[last])
+    if stays(last, len(g)):
+        arrivals.append(last)
+        side.sign = 0.0
+    side.waiting = bool(zero[-1]) and side.sign != 0.0
+    # an arrival is at the next look, if that is zero or the first, or within the cell before it
+    looks = np.array(arrivals, dtype=np.intp)
+    inside = (looks > 0) & ~zero[np.minimum(looks, len(g) - 1)]
+    places, few, sign = s[looks], cells.take(looks[inside] - 1), signs[looks]
+    places[inside] = _turn(lambda s: steps.values(few.rows, s) * sign[inside, None] > 0.0, few.a, few.b)[1]
+    at = zip(rows[looks].tolist(), places.tolist(), sign.tolist(), strict=True)
+    return [*found, *[Crossing(row, share, side, touching=False) for row, share, side in at]], beyond
+
+
+def _at_extrema(steps: WatchedSteps, cells: Cells) -> tuple[Cells, Indices]:
+    """The cells, parted at extrema where a quantity may come to zero and turn back; and the looks there."""
+    turns = (cells.slope_a != 0.0) & (cells.slope_a * cells.slope_b <= 0.0)
+    few = cells.take(turns)
+    ends, points = np.stack([few.g_a, few.g_b]), few.control_points()
+    toward = (ends * np.sign(few.slope_a) < 0.0).all(axis=0)
+    at_zero = np.abs(ends).min(axis=0) <= SMALL * np.abs(points).max(axis=0)
+    turns[turns] = (toward | at_zero) & ~few.clear()
+    few = cells.take(turns)
+    if not len(few.a):
+        return cells, np.zeros(0, dtype=np.intp)
+    sign = -np.sign(few.slope_a)
+    pair = _turn(lambda s: steps.slopes(few.rows, s) * sign[:, None] < 0.0, few.a, few.b)
+    at, g = np.stack(pair), np.stack([steps.values(few.rows, s) for s in pair])
+    nearest = np.argmin(g * sign, axis=0)[None]
+    s, value = (np.take_along_axis(table, nearest, axis=0)[0] for table in (at, g))
+    parted = cells.replaced(turns, few._replace(b=s, g_b=value), few._replace(a=s, g_a=value))
+    return parted, np.flatnonzero(turns) + np.arange(1, len(s) + 1)
+
+
+def _add_rounded_zeros(zero: Flags, beside: Indices, rounded: Callable[[Indices], Flags]) -> None:
+    """Flag looks that are zero to rounding near another at zero or `beside`: at an extremum, or after a sign turns."""
+    tested, near = np.zeros(len(zero), dtype=bool), np.flatnonzero(zero)
+    while True:
+        looks = np.unique(np.concatenate([near - 1, near, near + 1, beside - 1, beside]))
+        looks = looks[(looks >= 0) & (looks < len(zero))]
+        looks, beside = looks[~tested[looks]], beside[:0]
+        if not len(looks):
+            return
+        tested[looks] = True
+        near = looks[rounded(looks)]
+        zero[near] = True
+
+
+def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:
+    """Shares (k,), one apart in the last bit, between which `same`, true at `low` and false at `high`, first turns."""
+    if not len(low):
+        return low, high
+    parts = max(2, min(PARTS, TOGETHER // len(low)))
+    for _ in range(math.ceil(BITS / math.log2(parts))):
+        s = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, parts + 1)
+        s[:, -1] = high
+        turned = ~same(s[:, 1:-1])
+        first = np.where(turned.any(axis=1), np.argmax(turned, axis=1) + 1, parts)[:, None]
+        low, high = (np.take_along_axis(s, at, axis=1)[:, 0] for at in (first - 1, first))
+    return low, high
 
 
 class _Look(NamedTuple):
@@ -43,20 +306,14 @@ class _Look(NamedTuple):
 
 
 class EventLog:
-    """The events of a run, (number, t, x) each in `happened`.
-
-    ended: the event that has ended the run, in words.  status: why a reset has stopped it.
-    parameters: of the rate, those of the block that is to come.
-    restart: (t, x, x_new), the state that was reset and the one to go on from, else None.
-    said: {(number of an event, what): sentence}, once each.  resetting: whether there are events that reset the state.
-    """
+    """The events of a run."""
 
     def __init__(self, program: EventProgram) -> None:
         self.program, self.resetting = program, any([event.reset is not None for event in program.events])
-        self.parameters: Sequence[float] = ()
-        self.ended = self.status = ""
-        self.restart: tuple[float, Array, Array] | None = None
-        self.said: dict[tuple[int, str], str] = {}
+        self.parameters: Sequence[float] = ()  # of the rate, in the block that is to come
+        self.ended = self.status = ""  # the event that has ended the run, and why a reset has stopped it
+        self.restart: tuple[float, Array, Array] | None = None  # time, the state that was reset, the one to go on from
+        self.said: dict[tuple[int, str], str] = {}  # sentences, by the number of an event and what they say
         self.happened: list[Happening] = []
         self._sides: list[Side] = []  # none before the first step
         self._from = np.array([-float(event.direction) for event in program.events])  # sides, see `Crossing`
@@ -71,12 +328,11 @@ class EventLog:
         for first in range(0, len(block.t), STEPS):
             part = block.part(slice(first, first + STEPS))
             found = self._found(part)
-            rows, s = np.array([one[0] for one in found], dtype=np.intp), np.array([one[1] for one in found])
+            rows, s = np.array([one.row for one, _ in found], dtype=np.intp), np.array([one.s for one, _ in found])
             instants = zip(found, part.times_at(rows, s).tolist(), part.states_at(rows, s), strict=True)
-            for (row, share), group in itertools.groupby(instants, lambda one: one[0][:2]):
-                together = list(group)
-                _, t, x = together[0]
-                arrived = {number: one for (_, _, number, one), _, _ in together}
+            for (row, share), group in itertools.groupby(instants, lambda each: each[0][0][:2]):
+                (first_one, t, x), *others = group
+                arrived = {number: one for one, number in [first_one, *[each for each, _, _ in others]]}
                 if self._happen(part.part(slice(row + 1)), t, x, arrived):
                     return block.part(slice(first + row + (share > 0.0))).ending(t, x)
             self._see(part, len(part.t), part.x[-1])
@@ -94,14 +350,13 @@ class EventLog:
 
     def finish(self) -> None:
         """The run is at its end: what is zero there to the last bit has arrived."""
+        waiting = {k: Crossing(0, 1.0, side.sign, touching=False) for k, side in enumerate(self._sides) if side.waiting}
         if self._last is not None:
-            sides = enumerate(self._sides)
-            waiting = {number: Crossing(0, 1.0, side.sign, touching=False) for number, side in sides if side.waiting}
             self._happen(self._last, float(self._last.t[0]), self._last.x[0], waiting)
 
-    def _found(self, part: StepBlock) -> list[tuple[int, float, int, Crossing]]:
-        """Step, share of it, number of the event, and what its quantity does, of crossings in these steps, in order."""
-        found, events = list[tuple[int, float, int, Crossing]](), self.program.events
+    def _found(self, part: StepBlock) -> list[tuple[Crossing, int]]:
+        """Crossings in these steps, and the numbers of the events, in order."""
+        found, events = list[tuple[Crossing, int]](), self.program.events
         self._see(part, 0, part.x_old[0])
         if not self._sides:  # zero, to rounding, is rest; with a reset, on the side to come from
             own = [0.0 if event.reset is None else side for event, side in zip(events, self._from, strict=True)]
@@ -109,19 +364,16 @@ class EventLog:
         for number, side in enumerate(self._sides):
             noise = self._noise(number, float(part.t[-1]), part.x[-1]) if side.resting else 0.0
             some, beyond = crossings(WatchedSteps(events[number], self.parameters, part, noise), side)
-            found += [(one.row, one.s, number, one) for one in some]
+            found += [(one, number) for one in some]
             if beyond.any():
                 self._say(number, MISSED, part.t_old[np.argmax(beyond)])
-        return sorted(found)
+        return sorted(found, key=lambda each: (*each[0][:2], each[1], each[0]))
 
     def _see(self, part: StepBlock, steps: int, x: Array) -> None:
-        """The run came to x by the first steps of a part: how far its states have gone, and how many roundings old.
-
-        Rates tell what a reset leaves at rest.
-        """
+        """The run came to x by the first steps of a part: how far its states have gone, and how many roundings old."""
         self._steps += steps
         seen = [np.vstack([part.x_old[:steps], x])]
-        if self.resetting:
+        if self.resetting:  # rates tell what a reset leaves at rest
             times = np.append(part.t_old[:steps], part.t_old[0] if steps == 0 else part.t[steps - 1])
             seen.append(self.program.rates(times, seen[0], self.parameters))
         for k, values in enumerate(seen):
@@ -152,12 +404,9 @@ class EventLog:
         return resets or bool(self.ended)
 
     def _reset(self, step: StepBlock, t: float, x: Array, new: Mapping[int, Crossing], rested: Flags) -> None:
-        """Reset the state at an instant of a step.
-
-        One rule: what is due and has no reset happens, then the first reset that is due, and it is looked again. Due is
-        what is zero and moves to the other side than it has come from; what touches, once. One that ends the run does
-        so before any reset.  rested: what was at zero at the start of the step.
-        """
+        """Reset the state at an instant of a step.  rested: what was at zero at the start of the step."""
+        # What is due and has no reset happens, then the first reset that is due, and it is looked again. Due is what is
+        # zero and moves to the other side than it has come from; what touches, once.
         events, start, resets, look = self.program.events, x, list[int](), self._look(t, x, step)
         touching = {number for number, one in new.items() if one.touching}
         returns = np.flatnonzero(rested & look.zero & (look.motions * self._from > 0.0)).tolist()
@@ -205,37 +454,35 @@ class EventLog:
             return ""
         names = [f"{events[number].name!r}" for number in sorted({*(resets[-AT_ONCE:] or new)})]
         which = f"event {names[0]} resets" if len(names) == 1 else f"events {', '.join(names)} reset"
-        what = f"{which} the state again and again at this instant"
-        return f"{stopped} {what}; a contact that stays needs other equations from here on"
+        why = "the state again and again at this instant; a contact that stays needs other equations from here on"
+        return f"{stopped} {which} {why}"
 
     def _look(self, t: float, x: Array, step: StepBlock | None = None) -> _Look:
         """The quantities at an instant of a step, also after resets there; or at a start."""
         at, states, p, events = np.array([t]), x[None], self.parameters, self.program.events
-        values = np.array([event.value(at, states, p)[0] for event in events])
+        values = np.array([numbers_of(event.values, at, states, p)[0] for event in events])
         end = 0.0 if step is None else step.x
         zero = np.abs(values) <= np.array([self._noise(number, t, x, end) for number in range(len(events))])
         x_dot = self.program.rates(at, states, p)
         fastest = np.fmax(self._gone[1:], np.where(np.isfinite(x_dot), np.abs(x_dot), 0.0))
         motions, none = np.zeros(len(events)), np.zeros_like(states)
         for number in np.flatnonzero(zero):
-            event = events[number]
-            motion = event.slope(at, states, p, x_dot, np.ones(1))[0]
-            off = event.error(at, states, p, fastest, np.ones(1)) - event.error(at, states, p, none, np.zeros(1))
-            motions[number] = 0.0 if abs(motion) <= self._roundings * off[0] else motion
+            motion = numbers_of(events[number].slopes, at, states, p, x_dot, np.ones(1))[0]
+            pairs = ((fastest, np.ones(1)), (none, np.zeros(1)))
+            off, own = [numbers_of(events[number].errors, at, states, p, *pair)[0] for pair in pairs]
+            motions[number] = 0.0 if abs(motion) <= self._roundings * (off - own) else motion
         return _Look(zero, values, motions if step is None else motions * np.sign(step.h[0]))
 
     @property
     def _roundings(self) -> float:
-        """Rounding errors of states by now, relative to how far they have gone.
-
-        Roundings of steps add up at random; a rate that is off takes its state off by that share of the whole way.
-        """
+        """Rounding errors of states by now, relative to how far they have gone: those of steps add up at random."""
         return UNIT * ROUNDED * math.sqrt(1.0 + self._steps)
 
     def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:
         """Error of a quantity by the rounding of states, also inside a step to an end (1, m)."""
-        errors = self._roundings * self._gone[:1] + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
-        return float(self.program.events[number].error(np.array([t]), x[None], self.parameters, *errors)[0])
+        graph, at, share = self.program.events[number].errors, np.array([t]), self._roundings
+        errors = share * self._gone[:1] + UNIT * np.abs(end), share * np.abs(at)
+        return float(numbers_of(graph, at, x[None], self.parameters, *errors)[0])
 
     def _say(self, number: int, what: str, t: float) -> None:
         self.said.setdefault((number, what), f"event {self.program.events[number].name!r} {what.format(t)}")

@@ -1,4 +1,4 @@
-"""The estimated error of random runs of equal steps beside the true one: kinks, jumps, resets, few rows, controllers.
+"""The estimated error of random runs of equal steps beside the true one: kinks, jumps, few rows.
 
 The motions are piecewise linear, and so have closed forms: eigenvectors between the instants at which a force changes,
 which bisection finds.
@@ -22,7 +22,7 @@ from tests.dynamics.models import Array
 from tests.slow import slow
 
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
-KINDS = ["kink", "reset", "rows", "controller"]
+KINDS = ["kink", "rows"]
 JUMPS = ["potential", "friction", "switch"]  # of the force, across a plane of positions, at rest, or in time
 WRITTEN = [cg.abs, lambda x: cg.maximum(x, -x), lambda x: cg.where(x > 0.0, x, -x), lambda x: x * cg.sign(x)]
 SHARES = [0.0, 0.25, 0.5, 1.0 / 3.0, 0.285, 0.9]  # of a step, by which a leg is longer than whole steps
@@ -63,7 +63,7 @@ class Fall:
 
 
 class RandomRun:
-    """Masses on springs, with a spring that acts on one side of a plane, a wall, or a controller besides.
+    """Masses on springs, with a spring that acts on one side of a plane besides.
 
     Or, where `kind` is one of `JUMPS`, a force that is turned, with or without springs; legs then are whole steps and a
     share of one.
@@ -76,7 +76,7 @@ class RandomRun:
         self.kind, self.n = kind or KINDS[seed % len(KINDS)], int(rng.integers(1, 4))
         n, square = self.n, rng.normal(size=(self.n, self.n))
         self.stiffness = square @ square.T + np.diag(rng.uniform(0.5, 2.0, n))
-        self.damping = rng.choice([0.0, 0.1], n) * rng.uniform(0.0, 1.0, n) + 0.05 * (self.kind == "controller")
+        self.damping = rng.choice([0.0, 0.1], n) * rng.uniform(0.0, 1.0, n)
         self.normal = rng.normal(size=n)
         self.normal /= np.linalg.norm(self.normal)
         self.length, self.time = 10.0 ** rng.uniform(-6.0, 6.0, 2)
@@ -85,14 +85,9 @@ class RandomRun:
         self.dt = 10.0 ** rng.uniform(-2.2, -0.3) / fastest
         self.t_end = min(rng.uniform(5.0, 30.0) / slowest, 4000.0 * self.dt)
         self.q, self.qd = rng.normal(size=(2, n))
-        self.plane, self.extra, self.bounce = 0.3 * rng.normal(), rng.uniform(0.5, 8.0), rng.uniform(0.5, 1.0)
-        if self.kind == "reset":
-            self.plane = -abs(self.plane) - 0.1
-            self.q = self.q + self.normal * max(0.0, 0.1 - 2.0 * (self.normal @ self.q - self.plane))
+        self.plane, self.extra = 0.3 * rng.normal(), rng.uniform(0.5, 8.0)
         few = self.kind == "rows" or rng.random() < 0.5
         self.rows = np.sort(rng.uniform(0.1, 1.0, rng.integers(1, 4))) * self.t_end if few else None
-        self.period = min(self.dt * rng.uniform(1.0, 12.0), 0.3 / fastest)
-        self.gains = np.hstack([np.diag(rng.uniform(1.0, 6.0, n)), np.diag(rng.uniform(0.5, 2.0, n))])
         if self.kind in JUMPS:
             if self.kind != "friction" and rng.random() < 0.5:
                 self.stiffness, self.damping = np.zeros((n, n)), np.zeros(n)
@@ -129,18 +124,7 @@ class RandomRun:
                     side = side * cg.where(t < switch * second, 1.0, -1.0)
             return [-self.extra * self.normal[i] * side / one for i in indices]
 
-        def reset(q: Any, qd: Any, t: Any) -> Any:
-            speed = sum(self.normal[i] * qd[i] for i in indices)
-            return q, [qd[i] - (1.0 + self.bounce) * speed * self.normal[i] for i in indices]
-
-        def control(q: Array, qd: Array, t: float) -> Array:
-            return -(self.gains @ np.concatenate([q / one, qd * second / one])) / one
-
         options: dict[str, Any] = {"dt": self.dt * second, "t_eval": None if rows is None else rows * second}
-        if self.kind == "reset":
-            options["events"] = dyn.Event("wall", lambda q, qd, t: height(q), -1, reset=reset)
-        if self.kind == "controller":
-            options["tau"] = dyn.SampledController(control, self.period * second)
         if self.kind in ("friction", "switch"):
             options["tau"] = turned
         names = [f"x{i}" for i in indices]
@@ -156,29 +140,19 @@ class RandomRun:
         n, across = self.n, np.concatenate([self.normal, np.zeros(self.n)])
         t, y = 0.0, np.concatenate([self.q, self.qd])
         free = self._flow(self.stiffness, np.zeros(n))
-        if self.kind == "controller":
-            legs = []
-            while len(legs) * self.period < self.t_end:
-                legs.append((len(legs) * self.period, y, self._flow(self.stiffness, -self.gains @ y)))
-                y = legs[-1][2].at(y, self.period)[0]
-            return legs
         if self.kind == "rows":
             return [(t, y, free)]
         if self.kind in JUMPS:
             return self._turned_legs(y)
         pressed = self.stiffness + self.extra * np.outer(self.normal, self.normal)
         flows = [free, self._flow(pressed, self.extra * self.plane * self.normal)]
-        above = int(across @ y > self.plane) if self.kind == "kink" else 0
+        above = int(across @ y > self.plane)
         legs = [(t, y, flows[above])]
         while len(legs) < LEGS:
-            flow, side = flows[above], -1.0 if self.kind == "kink" and not above else 1.0
+            flow, side = flows[above], 1.0 if above else -1.0
             if (after := self._crossing(flow, y, across * side, self.plane * side, self.t_end - t)) is None:
                 break
-            t, y = t + after, flow.at(y, after)[0]
-            if self.kind == "kink":
-                above = 1 - above
-            else:
-                y[n:] -= (1.0 + self.bounce) * (self.normal @ y[n:]) * self.normal
+            t, y, above = t + after, flow.at(y, after)[0], 1 - above
             legs.append((t, y, flows[above]))
         return legs
 
@@ -225,12 +199,10 @@ class RandomRun:
         return high if high <= most else None
 
     def error(self, run: dyn.Trajectory) -> float:
-        """The largest of the rows, of each component in units of its largest value, between the same resets."""
+        """The largest of the rows, of each component in units of its largest value."""
         t, starts = run.t / self.time, np.array([leg[0] for leg in self.legs])
         x = np.hstack([run.q / self.length, run.qd * self.time / self.length])
         leg = np.searchsorted(starts, t, side="right") - 1
-        if self.kind == "reset":
-            leg = np.searchsorted(run.events["wall"].t, run.t) + np.append(0, np.diff(run.t) == 0.0)
         if leg.max() >= len(self.legs):
             return math.inf
         ends = np.append(starts[1:], self.t_end)

@@ -12,9 +12,8 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics import simulate_many
-from dynamics.simulation.ensembles import lanes, task
-from dynamics.simulation.ensembles.lanes import FEW_TRAJECTORIES, VECTOR, fits_lanes
-from dynamics.simulation.steps.equal_steps import EqualSteps
+from dynamics.simulation.ensembles import task
+from dynamics.simulation.ensembles.task import FEW_TRAJECTORIES, VECTOR, fits_lanes
 from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
 from tests.dynamics.models import oscillator, random_arm
@@ -139,7 +138,7 @@ def test_lanes_that_are_interrupted_go_on_with_the_same_bits() -> None:
     model = random_arm(2)
     q, qd = starts(model, 4)
     whole = simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0])
-    with patch.object(lanes, "PASSES", 3), patch.object(lanes, "BLOCK_TIME", 0.0):
+    with patch.multiple(task, PASSES=3, BLOCK_TIME=0.0):
         assert same(whole, simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0]))
 
 
@@ -213,14 +212,14 @@ def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
         return step_program(problem, METHODS[method], dense=False)
 
     fine = RunOptions(1.0)
-    steps = [EqualSteps(0.0, 1e-3, 1000, 1.0)]
-    assert fits_lanes(program("dop853"), fine, [], FEW_TRAJECTORIES)
-    assert not fits_lanes(program("dop853"), fine, [], FEW_TRAJECTORIES - 1)
-    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), [], FEW_TRAJECTORIES)
+    steps = 1000
+    assert fits_lanes(program("dop853"), fine, 0, FEW_TRAJECTORIES)
+    assert not fits_lanes(program("dop853"), fine, 0, FEW_TRAJECTORIES - 1)
+    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), 0, FEW_TRAJECTORIES)
     assert fits_lanes(program("rk4"), RunOptions(1.0, "rk4"), steps, 1)
     assert not fits_lanes(program("rk4"), RunOptions(1.0, "rk4", max_steps=999), steps, FEW_TRAJECTORIES)
     assert not fits_lanes(program("gauss4"), RunOptions(1.0, "gauss4"), steps, VECTOR - 1)
-    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), [], FEW_TRAJECTORIES)
+    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), 0, FEW_TRAJECTORIES)
     q, qd = starts(spring(), 7)
     one_by_one = simulate_many(spring(), q, qd, 0.3, "radau", t_eval=[0.3])
     each_is_alone(spring(), one_by_one, q, qd, 0.3, "radau", t_eval=[0.3])

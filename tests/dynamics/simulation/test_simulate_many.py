@@ -85,7 +85,7 @@ def test_many_steps_come_in_many_blocks() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dyn.SimulationWarning)
         whole = [simulate_many(*run, 0.2, "rk4", t_eval=times) for *run, times in runs]
-        with patch.multiple("dynamics.simulation.ensembles.lanes", PASSES=3), patch.object(task, "ROWS", 200):
+        with patch.multiple(task, PASSES=3, ROWS=200):
             blocks = [simulate_many(*run, 0.2, "rk4", t_eval=times) for *run, times in runs]
     assert all(map(same, whole, blocks))
     for one, other in zip(whole, blocks, strict=True):
@@ -159,7 +159,12 @@ Q = np.zeros((4, 2))
             {"workers": 0},
             "workers must be a whole number from 1, None for one on each core, an executor or a function",
         ),
-        (Q, Q, {"workers": ThreadPoolExecutor}, "an executor, and ThreadPoolExecutor is the class of one"),
+        (
+            Q,
+            Q,
+            {"workers": ThreadPoolExecutor},
+            "workers must be .* or a function like map, got <class .*ThreadPoolEx",
+        ),
         (Q, Q, {"workers": lambda f, each: []}, "a result for each item, as map does: of 4 trajectories came back 0"),
     ],
 )

@@ -50,7 +50,7 @@ def test_what_is_missing_is_run_and_nothing_else(kind: str, tmp_path: Path) -> N
     alone = sweep(**KINDS[kind])
     for workers, left in ((1, range(5)), (3, (1, 3)), (map, (4,)), (1, ())):
         for k in left:
-            (tmp_path / f"chunk-{8 * k:09d}.npz").unlink(missing_ok=True)
+            (tmp_path / f"chunk-{8 * k:09d}.json").unlink(missing_ok=True)
         with patch.object(task.Task, "run", autospec=True, side_effect=task.Task.run) as run:
             result = sweep(**KINDS[kind], store=tmp_path, workers=workers, chunk=8 if workers == 1 else 16)
         assert sorted(call.args[1].first for call in run.call_args_list) == [8 * k for k in left]
@@ -116,9 +116,9 @@ def test_ctrl_c_keeps_the_chunks_that_are_done(tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     options = KINDS["side by side"]
-    with pytest.raises(KeyboardInterrupt, match="keeps 8 of 40 trajectories: the same call goes on"):
+    with pytest.raises(KeyboardInterrupt):
         sweep(**options, store=tmp_path, workers=interrupted)
-    assert [path.name for path in tmp_path.glob("chunk-*")] == ["chunk-000000000.npz"]
+    assert [path.name for path in tmp_path.glob("chunk-*")] == ["chunk-000000000.json"]
     assert same(sweep(**options), sweep(**options, store=tmp_path))
 
 
@@ -132,7 +132,7 @@ OTHERS: list[tuple[str, dict[str, Any]]] = [
     ("rtol is 1e-09, here 1e-08", {"rtol": 1e-8}),
     ("atol", {"atol": [1e-10, 1e-9]}),
     ("method is 'dop853', here 'dopri5'", {"method": "dopri5"}),
-    ("times", {"t_eval": [0.1, 0.15]}),
+    ("t_eval", {"t_eval": [0.1, 0.15]}),
     ("max_step", {"max_step": 0.1}),
     ("parameters", {"k": [1.0, 3.0]}),
     ("trajectories is 2, here 3", {"k": [1.0, 2.0, 3.0]}),
@@ -157,7 +157,7 @@ def test_a_folder_of_something_else_or_damaged_is_a_sentence(tmp_path: Path) -> 
         springs(tmp_path, [1.0, 2.0])
     store = tmp_path / "new" / "sweep"
     whole = springs(store, [1.0, 2.0])
-    (store / "chunk-000000000.npz").write_bytes(b"PK")  # a chunk that cannot be read is run again
+    (store / "chunk-000000000.json").write_text("{")  # a chunk that cannot be read is run again
     assert same(whole, springs(store, [1.0, 2.0]))
     rows, unfinished = store / "rows.npy", store / ".rows.npy.1.tmp"
     bits = rows.read_bytes()
@@ -167,10 +167,10 @@ def test_a_folder_of_something_else_or_damaged_is_a_sentence(tmp_path: Path) -> 
     assert not unfinished.exists()  # what a process that was killed was writing
     for cut in (len(bits) - 8, 130, 0):
         os.truncate(rows, cut)
-        with pytest.raises(ValueError, match=rf"sweep' is damaged: its rows\.npy has {cut} bytes, not {len(bits)}; "):
+        with pytest.raises(ValueError, match=rf"sweep' is damaged: its rows\.npy of {cut} bytes is .*of {len(bits)} b"):
             springs(store, [1.0, 2.0])
     rows.write_bytes(bytes(len(bits)))
-    with pytest.raises(ValueError, match=r"is damaged: its rows\.npy is no table of NumPy"):
+    with pytest.raises(ValueError, match=r"is damaged: its rows\.npy of \d+ bytes is no table of NumPy"):
         springs(store, [1.0, 2.0])
     rows.unlink()
     with pytest.raises(ValueError, match=r"is damaged: it has results of chunks, and no rows\.npy"):
@@ -184,8 +184,8 @@ def test_a_folder_of_something_else_or_damaged_is_a_sentence(tmp_path: Path) -> 
 
 def test_a_store_that_has_no_room_is_a_sentence(tmp_path: Path) -> None:
     full = patch("shutil.disk_usage", return_value=SimpleNamespace(free=0))
-    with full, pytest.raises(OSError, match="GiB for 2 trajectories of 2 rows of 2 numbers, and 0 GiB are free"):
+    with full, pytest.raises(OSError, match=r"needs .* GiB for its rows\.npy, .*: 0 GiB are free"):
         springs(tmp_path, [1.0, 2.0])
-    large = patch("numpy.lib.format.open_memmap", side_effect=OSError(27, "File too large"))
-    with large, pytest.raises(OSError, match=rf"store '{tmp_path}' needs a rows\.npy of .* GiB, .*: File too large"):
+    large = patch("os.posix_fallocate", create=True, side_effect=OSError(27, "File too large"))
+    with large, pytest.raises(OSError, match=rf"store '{tmp_path}' needs .* GiB for its rows\.npy, .*: File too large"):
         springs(tmp_path, [1.0, 2.0])
