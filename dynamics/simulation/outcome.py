@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from cgraph._shared import Array, counted, real_number
 
 from .estimates.error_estimate import RunEstimate
-from .run_options import SMALL_MEMORY, TABLES, RunOptions, room
+from .run_options import SMALL_MEMORY, TABLES, Span, Steps, room
 from .stepper import Stepper
 from .steps.dense_output import StepBlock
 from .steps.row_values import converted
@@ -106,7 +106,7 @@ class MotionSteps:
 
     def __init__(self, run: Stepper, x: Array, t0: float, t_end: float | None) -> None:
         self._run, self._x, self._t_end = run, x, None if t_end is None else float(t_end)
-        self._begun, self._direction = False, 0.0
+        self._direction = 0.0  # before the first step
         run.begin(x, t0, t0 + 1.0 if t_end is None else t_end)
 
     @property
@@ -137,9 +137,7 @@ class MotionSteps:
         if self._t_end is None or self._t_end == self.t:
             where = "was started without one" if self._t_end is None else f"is there, at t = {self.t:g} s"
             raise ValueError(f"a step goes on to t_end, and the motion {where}: propagate_until(t) goes on to a time")
-        self._go(self._t_end)
-        self._run.step()
-        self._judge()
+        self._advance(self._t_end, single=True)
 
     def propagate_until(self, t: float) -> None:
         """Steps to an instant, the last of which ends there.
@@ -156,23 +154,18 @@ class MotionSteps:
         TypeError, ValueError
             For what is no time, or one that the motion has left behind.
         """
-        t = real_number("t", t)
-        if t == self.t:
-            return
-        self._go(t)
-        self._run.until(t)
-        self._judge()
+        if (t := real_number("t", t)) != self.t:
+            self._advance(t, single=False)
 
-    def _go(self, t: float) -> None:
+    def _advance(self, t: float, *, single: bool) -> None:
         if not math.isfinite(t):
             raise ValueError(f"t must be finite, got {t!r} s")
         if self._direction * (t - self.t) < 0.0:
             raise ValueError(f"the motion is at t = {self.t:g} s and does not go back to t = {t:g} s: start it anew")
-        if not self._begun:
+        if not self._direction:
             self._run.begin(self._x, self.t, t if self._t_end is None else self._t_end)
-            self._direction, self._begun = math.copysign(1.0, t - self.t), True
-
-    def _judge(self) -> None:
+            self._direction = math.copysign(1.0, t - self.t)
+        self._run.advance(t, single=single)
         for text in self._run.warnings:
             warnings.warn(text, SimulationWarning, stacklevel=3)
         self._run.warnings.clear()
@@ -181,17 +174,13 @@ class MotionSteps:
 
 
 class Recorder:
-    """The rows of a trajectory that starts with x at t0: every step, or the states at `times`.
+    """The rows of a trajectory that starts with x: every step, or the states at the times of a span."""
 
-    direction: 1.0, or -1.0 for a run back in time, whose times decrease.
-    """
-
-    def __init__(self, x: Array, times: Array | None, t0: float = 0.0, direction: float = 1.0) -> None:
-        self.times, self.direction = times, direction
-        self.last, self._last_state = t0, x  # how far the run has come [s]
-        at_start = int(times is None or times[0] == t0)
-        self._parts = [(np.array([t0])[:at_start], np.array([x])[:at_start])]  # times and states
-        self._next = at_start  # of `times`
+    def __init__(self, x: Array, span: Span) -> None:
+        self._times, self._direction = span.times, span.direction
+        self.last, self._last_state = span.t0, x  # how far the run has come [s]
+        at_start = self._next = int(span.times is None or span.times[0] == span.t0)  # of the times
+        self._parts = [(np.array([span.t0])[:at_start], np.array([x])[:at_start])]  # times and states
         self.size = 0  # bytes
 
     def add(self, block: StepBlock) -> None:
@@ -199,18 +188,18 @@ class Recorder:
         if not len(block.t):
             return
         last, following = float(block.t[-1]), self._next
-        if self.times is None:
+        if self._times is None:
             self._append(block.t, block.x)
         else:
-            following = int(np.searchsorted(self.direction * self.times, self.direction * last, side="right"))
-            times = self.times[self._next : following]
+            following = int(np.searchsorted(self._direction * self._times, self._direction * last, side="right"))
+            times = self._times[self._next : following]
             self._append(times, block.at(times))
         self._next, self.last, self._last_state = following, last, block.x[-1].copy()
 
     def add_last(self) -> None:
         """Add the state at which a run stopped as its last row, also between the times of t_eval."""
         recorded = [times[-1] for times, _ in self._parts if len(times)]
-        if not recorded or self.direction * (self.last - recorded[-1]) > 0.0:
+        if not recorded or self._direction * (self.last - recorded[-1]) > 0.0:
             self._append(np.array([self.last]), self._last_state[None])
 
     def _append(self, times: Array, states: Array) -> None:
@@ -226,39 +215,45 @@ class Recorder:
 def outcome(
     run: Stepper,
     x: Array,
-    options: RunOptions,
-    again: Callable[[RunOptions], Stepper] | None = None,
+    span: Span,
+    again: Callable[[Steps], Stepper] | None = None,
     steps: list[StepBlock] | None = None,
     report: Callable[[float], None] | None = None,
 ) -> tuple[Stats, Recorder]:
-    """How a run from x (m,) to t_end, an event, a failure or Ctrl-C goes, and its rows.
-
-    again: the same run by other options, see `advise`.  steps: receives all steps, with their dense output.
-    report: is told how far the run is [s]; the rows then may fill the memory.
-    """
-    recorder = Recorder(x, options.times, options.t0, options.direction)
-    begin, estimate = time.perf_counter(), RunEstimate(run, x, options)
+    """How a run from x (m,) goes, and its rows; steps: receives all; report: is told how far it is [s]."""
+    recorder, estimate = Recorder(x, span), RunEstimate(run, x, span)
+    begin, kept, most = time.perf_counter(), 0, SMALL_MEMORY
     error, at_end, end = None, None, None
     doubts: tuple[str, ...] = ()
     try:
         with np.errstate(all="ignore"):
-            for block in run.blocks(x) if report is None else _noted(run, x, recorder, options, steps, report):
-                recorder.add(block)
-                estimate.add(block)
+            for block in run.blocks(x, span):
+                made = block if steps is None else run.with_dense(block)
+                recorder.add(made)
+                estimate.add(made)
+                if steps is not None:
+                    steps.append(made)
+                    kept += made.nbytes
+                if report is None:
+                    continue
+                report(abs(recorder.last - span.t0))
+                most = room() / TABLES if recorder.size + kept > most == SMALL_MEMORY else most
+                if recorder.size + kept > most:
+                    run.status = f"stopped at t = {recorder.last:.6g} s: the rows fill the memory; t_eval records fewer"
+                    break
             if not run.status:
                 error, at_end, doubts = estimate.result()
         end = time.perf_counter()
-        advise(run, recorder.last, options, x, again)
+        advise(run, recorder.last, span, x, again)
     except KeyboardInterrupt:
         run.status = f"{INTERRUPTED} after t = {recorder.last:.6g} s"
-    seconds = (time.perf_counter() if end is None else end) - begin - estimate.seconds
     stats = Stats(
-        options.method,
+        run.options.method,
         run.steps,
         run.rejected,
         run.evaluations,
         run.largest,
-        seconds,
+        (time.perf_counter() if end is None else end) - begin - estimate.seconds,
         not run.status,
         run.status or run.event or REACHED,
         -1 if run.status else int(bool(run.event)),
@@ -267,54 +262,22 @@ def outcome(
         error,
         at_end,
         (*run.warnings, *doubts),
-        *run.prices,
+        *run.compiled.prices,
     )
     return stats, recorder
 
 
-def _noted(
-    run: Stepper,
-    x: Array,
-    recorder: Recorder,
-    options: RunOptions,
-    steps: list[StepBlock] | None,
-    report: Callable[[float], None],
-) -> Iterator[StepBlock]:
-    """The blocks of a run, until rows and steps fill the memory."""
-    kept, most = 0, SMALL_MEMORY
-    for block in run.blocks(x):
-        if steps is not None:
-            steps.append(block if block.dense is not None else run.with_dense(block))
-            kept += steps[-1].nbytes
-        yield block if steps is None else steps[-1]
-        if recorder.size + kept > most:
-            most = room() / TABLES if most == SMALL_MEMORY else most
-            if recorder.size + kept > most:
-                last = f"{recorder.last:.6g} s"
-                run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
-                return
-        report(abs(float(block.t[-1]) - options.t0))
-
-
-def advise(
-    run: Stepper, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Stepper] | None
-) -> None:
-    """Name the method in the warning of a run that is stiff, or in the status of one that lacks a derivative.
-
-    None where all of them stop, or take steps as short, or come no farther.
-
-    reached: how far the run has come [s].  x: where it started, (m,).  again: the same run by other options;
-    None where a controller decides, which may remember what it has seen.
-    """
+def advise(run: Stepper, reached: float, span: Span, x: Array, again: Callable[[Steps], Stepper] | None) -> None:
+    """Name a method that does better in the warning of a stiff run, or in the status of one that lacks a derivative."""
     if not (run.stiff or run.slope) or again is None:
         return
-    length = LONGER_STEPS * abs(reached - options.t0) / max(run.steps, 1)
+    length = LONGER_STEPS * abs(reached - span.t0) / max(run.steps, 1)
     for name in OTHERS if run.slope else IMPLICIT:
-        t = options.t0
+        t = span.t0
         try:
-            trial = again(replace(options, method=name, t_eval=None, max_steps=TRIED))
+            trial = again(replace(run.options, method=name, max_steps=TRIED))
             with np.errstate(all="ignore"):
-                for block in trial.blocks(x):
+                for block in trial.blocks(x, Span(span.t_end, t0=span.t0)):
                     t = float(block.t[-1]) if len(block.t) else t
         except Exception:  # noqa: BLE001, S112 -- whatever another method lacks: the run that was asked for is done
             continue
@@ -323,7 +286,7 @@ def advise(
             run.status += text
             return
         whole = trial.steps + trial.rejected < TRIED
-        if not run.slope and not (trial.status and whole) and abs(t - options.t0) >= length * trial.steps > 0.0:
+        if not run.slope and not (trial.status and whole) and abs(t - span.t0) >= length * trial.steps > 0.0:
             run.warnings[run.warnings.index(run.stiff)] += text
             return
 

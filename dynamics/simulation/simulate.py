@@ -17,7 +17,7 @@ from .applied_force import SampledController, Tau, check_varied
 from .events.event import Event, as_events
 from .outcome import InterruptedMotion
 from .run import Run
-from .run_options import METHOD, Options, RunOptions, time_span
+from .run_options import METHOD, Options, Steps, known_options, time_span
 from .trajectory import Trajectory
 
 
@@ -65,8 +65,8 @@ def simulate(
     tau : float, sequence, callable or SampledController
         Applied force [N m or N]: constant, for all velocities or for each, (n,); or a controller. One in closed form is
         a function (q, qd, t) or (q, qd, t, p) to a node or number for each velocity, which is compiled into the steps,
-        see `with_controller`. A `SampledController` calls a Python function of numbers once in a period; equal steps
-        then have their error estimated by steps of half the length, period by period.
+        see `with_controller`. A `SampledController` calls a Python function of numbers once in a period; the error of
+        equal steps then is not estimated.
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those that a controller in closed form has besides.
     **options
@@ -164,8 +164,14 @@ def _run(
     form, dense = options.pop("form", FORMS[0]), require_flag("dense_output", options.pop("dense_output", False))
     equations = as_equations(model)
     require_choice("form", form, FORMS)
-    if not (callable(tau) or isinstance(tau, float | SampledController)):
-        other_inputs(equations, tau)
     names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
     check_varied(equations, tau, names)
-    return Run(model, RunOptions.of(method, options), tau, as_events(events), form, dense, names)
+    steps = Steps(method, **known_options(options))
+    if not (callable(tau) or isinstance(tau, SampledController)):
+        other_inputs(equations, tau)
+    if steps.estimate_error and isinstance(tau, SampledController):
+        raise ValueError(
+            "estimate_error cannot be True with a SampledController, whose forces answer one run alone: run again with "
+            "half of dt and compare"
+        )
+    return Run(model, steps, tau, as_events(events), form, dense, names)

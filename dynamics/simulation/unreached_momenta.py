@@ -23,11 +23,7 @@ def unreached_momenta(
     *,
     start: tuple[float, Array, Array],
 ) -> list[str]:
-    """Doubts of rows (T, m) of a problem in momenta, a sentence each.
-
-    parameters: further inputs of the graph, (k,); without them 0, of forces that velocities do not depend on.
-    start: the instant, q and qd, and the state (m,) that they make.
-    """
+    """Doubts of rows (T, m) of a problem in momenta; start: the instant, q and qd, and the state (m,) they make."""
     if problem.missing is None or not len(rows):
         return []
     said = _other_velocities(problem, *start, parameters)

@@ -18,10 +18,9 @@ from cgraph.extend import Call, FixedPoint, If, Program, While, runner
 
 from ...integrators.step_control import DONE
 from ..run_options import RunOptions
-from ..stepper import BLOCK_TIME, HELD, StoppedError, beginning, over, tolerance
+from ..stepper import BLOCK_TIME, HELD, StoppedError, first_registers, span_registers
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import EqualSteps, Numbers
-from ..steps.first_step import TOLERANCE
 from ..steps.state_sizes import Flags
 from ..steps.step_program import StepProgram
 
@@ -231,8 +230,8 @@ def chosen_in_lanes(
     rows: (k, T, m), receives the states at the times of the options, NaN from where a run has not come to.
     """
     first = int(options.row_times[0] == options.t0)  # the first row that a step makes
-    start = beginning(options, max(options.relative, program.finest)) | over(options.t0, options.t_end)
-    values = {"x": x, "p": p, TOLERANCE: tolerance(options), "lanes.toward": options.direction}
+    start = first_registers(program, options) | span_registers(options)
+    values: dict[str, ArrayLike] = {"x": x, "p": p, "lanes.toward": options.direction}
     run = _Memories(code, len(x), start | values)
 
     def going() -> tuple[Numbers, float]:

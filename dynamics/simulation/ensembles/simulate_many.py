@@ -144,7 +144,7 @@ def simulate_many(
     watched, team = as_events(events), checked(workers)
     applied = with_applied(model, tau, parameters)
     start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
-    run.check(start.states)
+    run.check(run, start.states)
     _require_room(run, *start.x.shape, stored=folder is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them

@@ -166,7 +166,7 @@ class Task:
                 run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
             run.set_parameters(p)
             if has_end and isinstance(run, ChosenStepper) and run.log is None:  # steps need not be looked at
-                if run.unseen(x):
+                if run.unseen(x, self.options):
                     counts = {"steps": run.steps, "rejected": run.rejected, "nfev": run.evaluations, "dt": run.largest}
                     part.reached(k, **counts)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x

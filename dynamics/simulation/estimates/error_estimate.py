@@ -18,7 +18,7 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..run_options import RunOptions
+from ..run_options import Span, Steps
 from ..stepper import EqualStepper, Stepper
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import (
@@ -105,7 +105,7 @@ class Comparison(NamedTuple):
 
 
 def error_estimates(
-    program: StepProgram, options: RunOptions, law: Law, watch: Watch, steps: int, compared: Comparison
+    program: StepProgram, options: Steps, law: Law, watch: Watch, steps: int, compared: Comparison
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
@@ -171,24 +171,21 @@ def _errors(first: Array, measured: Array, law: Law, bent: Flags) -> Array:
 class RunEstimate:
     """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them."""
 
-    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
-        self._run, self._x, self._options = run, x, options
-        self._compared: _Whole | _Periods | None = None
+    def __init__(self, run: Stepper, x: Array, span: Span) -> None:
+        self._run, self._x, self._span, self._options = run, x, span, run.options
+        self._compared: _Whole | None = None
         self.seconds = 0.0  # spent here
 
     def add(self, block: StepBlock) -> None:
         """The next steps of the run, or a reset."""
-        if not self._options.estimated or not len(block.t):
+        if not self._options.estimated or self._run.control is not None or not len(block.t):
             return
         begin, run = time.perf_counter(), self._run
         assert isinstance(run, EqualStepper)
         if self._compared is None:
             p, program = np.array([run.parameters]), run.program
-            self._watch = Watch(program.rate, program.order, p, self._options.t0, self._x[None])
-            if run.control is None:
-                self._compared = _Whole(run, self._x, self._options)
-            else:
-                self._compared = _Periods(run, self._x, self._options.t0, self._watch)
+            self._watch = Watch(program.rate, program.order, p, self._span.t0, self._x[None])
+            self._compared = _Whole(run, self._x, self._span)
         if block.h[0] == 0.0:
             self._watch.restart(float(block.t[0]), block.x)
         else:
@@ -236,11 +233,11 @@ class _Whole:
     Runs with resets have these at other times, and are compared by their dense output where both have had as many.
     """
 
-    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
-        self._run, self._x, stretches = run, x, equal_steps(options.instants, options.step)
+    def __init__(self, run: EqualStepper, x: Array, span: Span) -> None:
+        self._run, self._x, self._span, stretches = run, x, span, equal_steps(span.instants, run.options.step)
         self._resetting = run.log is not None and run.log.resetting
         if self._resetting:
-            stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
+            stretches = equal_steps([span.t0, span.t_end], max([abs(part.h) for part in stretches]))
         self._beside = runs_beside(stretches, run.program.order)
         self._rows = _Rows(self._beside.t, x)
 
@@ -254,12 +251,10 @@ class _Whole:
         t = one.t[: one.count]
         rows, alike = [one.x[None, : len(t)]], list[Flags]()
         for stretches, _ in self._beside.runs if len(t) > 1 else ():
-            if self._resetting:
-                run = self._run.again(max([abs(part.h) for part in stretches]))
-            else:
-                run = self._run.beside(stretches, self._run.parameters)
+            dt = max([abs(part.h) for part in stretches])
+            run = self._run.beside(dt, () if self._resetting else stretches)
             other = _Rows(t, self._x)
-            for block in run.blocks(self._x * ASIDE):
+            for block in run.blocks(self._x * ASIDE, Span(self._span.t_end, t0=self._span.t0)):
                 if block.h[0] != 0.0:
                     other.add(block, run.resets)
                 if other.count == len(t):
@@ -279,46 +274,3 @@ def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
     late = max(LATE * longest, SHARE * abs(t[-1] - t[0]) / (1 + resets))
     apart = np.flatnonzero((np.abs(t[ends - 1] - t[begins]) > late) | (2 * alike.sum() < len(t)))
     return float(t[begins[apart[0]]]) if len(apart) else math.nan
-
-
-class _Periods:
-    """Differences of a run's stretches of steps under the same forces of a controller, each compared by itself.
-
-    These forces answer the states of the run, and would be others beside it: from where the run is, steps of half the
-    length are made under the same. The differences add up.
-    """
-
-    _stretch: EqualSteps  # of which so many steps are done
-
-    def __init__(self, run: EqualStepper, x: Array, t0: float, watch: Watch) -> None:
-        self._run = run
-        self._watch, self._t0, self._since, self._steps = watch, t0, math.inf, 0
-        self._size, self._sum = np.abs(x), np.zeros(len(x))
-
-    def add(self, block: StepBlock) -> None:
-        """The next steps of the run."""
-        if not self._steps or self._run.stretch is not self._stretch:
-            self._compare()
-            self._stretch, self._forces = self._run.stretch, self._run.parameters
-            self._start, self._steps = block.x_old[0], 0
-            self._watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
-        self._size = np.maximum(self._size, np.abs(block.x).max(axis=0))
-        self._steps, self._t, self._end = self._steps + len(block.t), float(block.t[-1]), block.x[-1]
-
-    def _compare(self) -> None:
-        """Add the difference of the stretch, as far as it went."""
-        if not self._steps:
-            return
-        begin, steps, end = self._stretch.begin, 2 * self._steps, self._start
-        run = self._run.beside([EqualSteps(begin, (self._t - begin) / steps, steps, self._t)], self._forces)
-        for block in run.blocks(self._start):
-            end = block.x[-1]
-        self._sum = self._sum + (math.nan if run.status else np.abs(end - self._end))
-        if not np.isfinite(self._sum).all():
-            self._since = min(self._since, self._t)
-
-    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
-        """What the differences tell, after the last step, as those of two rows."""
-        self._compare()
-        rows = [np.array([[self._size] * 2]), np.array([[self._size, self._size + self._sum]])]
-        return law_of_halves(longest, order), Comparison(np.array([self._t0, self._since]), rows)

@@ -161,11 +161,11 @@ class Motions:
         problem, options, start = self.equations.given, self.options, self.x[:, 0]
         parameters = self.inputs[: len(problem.parameters), 0]
         program = event_program(problem, self.events) if self.events else None
-        made = partial(stepper_of, problem, parameters=parameters.tolist(), events=program, between=bool(self.events))
+        made = partial(stepper_of, problem, parameters=parameters.tolist(), events=program, dense=bool(self.events))
         x = converted(problem.momentum, options.t0, start, parameters)
-        run, recorder = made(options), Recorder(x, None, options.t0, options.direction)
+        run, recorder = made(options), Recorder(x, options)
         with np.errstate(all="ignore"):
-            for block in run.blocks(x):
+            for block in run.blocks(x, options):
                 recorder.add(block)
         advise(run, recorder.last, options, x, made)
         if run.status:
@@ -215,7 +215,7 @@ def motions_of(
     moving = applied.model
     constant = rows[:, 0] if many and rows is not None else applied.constant  # a motion for each of their first forces
     start = initial_values(moving, q, qd, constant, parameters, t0, many=many)
-    run.check(start.states)
+    run.check(run, start.states)
     inputs = state_inputs(moving)
     chosen, names = _names(wrt, inputs.applied, inputs.parameters, closed=callable(tau)), inputs.applied
     forced = rows is not None or TORQUE in chosen or not start.varied.keys().isdisjoint(names)

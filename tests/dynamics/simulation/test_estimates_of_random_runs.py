@@ -1,4 +1,4 @@
-"""The estimated error of random runs of equal steps beside the true one: kinks, jumps, resets, few rows, controllers.
+"""The estimated error of random runs of equal steps beside the true one: kinks, jumps, resets, few rows.
 
 The motions are piecewise linear, and so have closed forms: eigenvectors between the instants at which a force changes,
 which bisection finds.
@@ -22,7 +22,7 @@ from tests.dynamics.models import Array
 from tests.slow import slow
 
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
-KINDS = ["kink", "reset", "rows", "controller"]
+KINDS = ["kink", "reset", "rows"]  # by the seed's rest by four, which is never three
 JUMPS = ["potential", "friction", "switch"]  # of the force, across a plane of positions, at rest, or in time
 WRITTEN = [cg.abs, lambda x: cg.maximum(x, -x), lambda x: cg.where(x > 0.0, x, -x), lambda x: x * cg.sign(x)]
 SHARES = [0.0, 0.25, 0.5, 1.0 / 3.0, 0.285, 0.9]  # of a step, by which a leg is longer than whole steps
@@ -63,7 +63,7 @@ class Fall:
 
 
 class RandomRun:
-    """Masses on springs, with a spring that acts on one side of a plane, a wall, or a controller besides.
+    """Masses on springs, with a spring that acts on one side of a plane, or a wall besides.
 
     Or, where `kind` is one of `JUMPS`, a force that is turned, with or without springs; legs then are whole steps and a
     share of one.
@@ -73,7 +73,7 @@ class RandomRun:
 
     def __init__(self, seed: int, kind: str = "") -> None:
         rng = np.random.default_rng([seed, 77])
-        self.kind, self.n = kind or KINDS[seed % len(KINDS)], int(rng.integers(1, 4))
+        self.kind, self.n = kind or KINDS[seed % 4], int(rng.integers(1, 4))
         n, square = self.n, rng.normal(size=(self.n, self.n))
         self.stiffness = square @ square.T + np.diag(rng.uniform(0.5, 2.0, n))
         self.damping = rng.choice([0.0, 0.1], n) * rng.uniform(0.0, 1.0, n) + 0.05 * (self.kind == "controller")
@@ -91,8 +91,7 @@ class RandomRun:
             self.q = self.q + self.normal * max(0.0, 0.1 - 2.0 * (self.normal @ self.q - self.plane))
         few = self.kind == "rows" or rng.random() < 0.5
         self.rows = np.sort(rng.uniform(0.1, 1.0, rng.integers(1, 4))) * self.t_end if few else None
-        self.period = min(self.dt * rng.uniform(1.0, 12.0), 0.3 / fastest)
-        self.gains = np.hstack([np.diag(rng.uniform(1.0, 6.0, n)), np.diag(rng.uniform(0.5, 2.0, n))])
+        rng.uniform(size=1 + 2 * n)
         if self.kind in JUMPS:
             if self.kind != "friction" and rng.random() < 0.5:
                 self.stiffness, self.damping = np.zeros((n, n)), np.zeros(n)
@@ -133,14 +132,9 @@ class RandomRun:
             speed = sum(self.normal[i] * qd[i] for i in indices)
             return q, [qd[i] - (1.0 + self.bounce) * speed * self.normal[i] for i in indices]
 
-        def control(q: Array, qd: Array, t: float) -> Array:
-            return -(self.gains @ np.concatenate([q / one, qd * second / one])) / one
-
         options: dict[str, Any] = {"dt": self.dt * second, "t_eval": None if rows is None else rows * second}
         if self.kind == "reset":
             options["events"] = dyn.Event("wall", lambda q, qd, t: height(q), -1, reset=reset)
-        if self.kind == "controller":
-            options["tau"] = dyn.SampledController(control, self.period * second)
         if self.kind in ("friction", "switch"):
             options["tau"] = turned
         names = [f"x{i}" for i in indices]
@@ -156,12 +150,6 @@ class RandomRun:
         n, across = self.n, np.concatenate([self.normal, np.zeros(self.n)])
         t, y = 0.0, np.concatenate([self.q, self.qd])
         free = self._flow(self.stiffness, np.zeros(n))
-        if self.kind == "controller":
-            legs = []
-            while len(legs) * self.period < self.t_end:
-                legs.append((len(legs) * self.period, y, self._flow(self.stiffness, -self.gains @ y)))
-                y = legs[-1][2].at(y, self.period)[0]
-            return legs
         if self.kind == "rows":
             return [(t, y, free)]
         if self.kind in JUMPS:
@@ -244,7 +232,7 @@ class RandomRun:
         return float((np.abs(x - exact) / np.abs(np.concatenate(course)).max(axis=0)).max())
 
 
-@mark.parametrize("seed", [*range(8), *slow(*range(8, 320))])
+@mark.parametrize("seed", [seed for seed in range(8) if seed % 4 < 3] + slow(*[k for k in range(8, 320) if k % 4 < 3]))
 def test_no_error_of_equal_steps_is_far_from_its_estimate(seed: int) -> None:
     """Where it is not said that it is unknown. That of few rows is that of all steps, which are its bound."""
     random = RandomRun(seed)
