@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph._shared import Array, HoldsNodes, or_nearest, real_array, real_number
+from cgraph._shared import Array, HoldsNodes, real_array, real_number
 
 from ..systems.controller import with_closed_form
 from ..systems.model import Equations, Model, as_equations
@@ -23,10 +23,9 @@ from .steps.equal_steps import SAME_INSTANT
 class SampledController(HoldsNodes):
     """A controller as a computer runs it: called at the start of every period, its forces held until the next.
 
-    Steps end where periods do, with every method, so that none goes over a jump of the forces. A reset by an event
-    leaves the forces and the periods as they are. The function may remember what it has seen, such as an integral of
-    the error: it is called once a period, in the order of time. What it raises ends the run, with the time as a note.
-    The error of equal steps is not estimated: run again with half of dt and compare.
+    Steps end where periods do. A reset by an event leaves the forces and the periods as they are. The function may
+    remember what it has seen: it is called once a period, in the order of time. What it raises ends the run, with the
+    time as a note. The error of equal steps is not estimated: run again with half of dt and compare.
 
     Parameters
     ----------
@@ -85,8 +84,7 @@ class HeldForces(NamedTuple):
         """The forces at times (T,), (T, n); at the end of a period those of the next, NaN before the first."""
         times = real_array("t", t)
         none = np.full((1, self.tau.shape[1]), np.nan)
-        rows: Array = np.concatenate([none, self.tau])[np.searchsorted(self.t, times + _rounding(times), side="right")]
-        return rows
+        return np.asarray(np.concatenate([none, self.tau])[np.searchsorted(self.t, times + _rounding(times), "right")])
 
 
 Constant: TypeAlias = float | Sequence[float]
@@ -112,41 +110,29 @@ def with_applied(model: Model, tau: Any, parameters: Mapping[str, Any] | None) -
     return Applied(*with_closed_form(moving, tau, parameters))
 
 
-def check_varied(model: Equations, tau: Tau, varied: Sequence[str]) -> None:
-    """Raise for parameters that cannot be varied. Those of a controller that is a function are what a run gives it."""
-    if varied and isinstance(tau, SampledController):
-        raise ValueError(f"varied = {varied} cannot be with a SampledController, which holds its forces")
-    if unknown := [name for name in varied if name not in model.parameters and not callable(tau)]:
-        known = or_nearest(unknown[0], list(model.parameters))
-        raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
-
-
+@dataclass(eq=False)
 class Hold:
     """The forces of a controller along a run; observed: qd of a state (q, p), t and forces, where states have p."""
 
-    def __init__(
-        self,
-        controller: SampledController,
-        velocities: Sequence[str],
-        nq: int,
-        t0: float,
-        observed: Callable[[Array], Array] | None = None,
-    ) -> None:
-        self._function, self._period, self._t0 = controller.function, controller.period, t0
-        self._velocities, self._nq, self._observed = velocities, nq, observed
-        self._times, self._forces = list[float](), list[list[float]]()
+    controller: SampledController
+    velocities: Sequence[str]
+    nq: int
+    t0: float
+    observed: Callable[[Array], Array] | None = None
+    times: list[float] = field(default_factory=list)
+    forces: list[list[float]] = field(default_factory=list)
 
     def at(self, t: float, x: Array) -> list[float]:
         """The forces from t on, (n,); x: the state, (m,)."""
-        if t >= self._t0 + len(self._times) * self._period - _rounding(t):
-            self._forces.append(self._called(t, x))
-            self._times.append(t)
-        return self._forces[-1]
+        if t >= self.t0 + len(self.times) * self.controller.period - _rounding(t):
+            self.forces.append(self._called(t, x))
+            self.times.append(t)
+        return self.forces[-1]
 
     def ends(self, t: float, t_end: float) -> Iterator[float]:
         """The ends of periods from t on, without those at t and t_end but for rounding; then t_end."""
-        for number in itertools.count(max(0, math.floor((t - self._t0) / self._period) - 1)):
-            end = self._t0 + number * self._period
+        for number in itertools.count(max(0, math.floor((t - self.t0) / self.controller.period) - 1)):
+            end = self.t0 + number * self.controller.period
             if end >= t_end - _rounding(t_end):
                 break
             if end > t + _rounding(t):
@@ -160,15 +146,17 @@ class Hold:
     @property
     def held(self) -> HeldForces:
         """The forces so far."""
-        return HeldForces(np.array(self._times), np.array(self._forces).reshape(-1, len(self._velocities)))
+        return HeldForces(np.array(self.times), np.array(self.forces).reshape(-1, len(self.velocities)))
 
     def _called(self, t: float, x: Array) -> list[float]:
-        names, qd = self._velocities, x[self._nq :]
+        names, qd = self.velocities, x[self.nq :]
         try:
-            if self._observed is not None:
-                qd = self._observed(np.concatenate([x, [t], np.zeros(len(qd))]))  # they do not depend on the forces
+            if self.observed is not None:
+                qd = self.observed(np.concatenate([x, [t], np.zeros(len(qd))]))  # they do not depend on the forces
             with np.errstate(all="warn"):
-                forces = real_array("the controller's forces", self._function(x[: self._nq].copy(), qd.copy(), t))
+                forces = real_array(
+                    "the controller's forces", self.controller.function(x[: self.nq].copy(), qd.copy(), t)
+                )
             if forces.shape != (len(names),):
                 needed = f"({len(names)},), one for each of {', '.join(names)}"
                 raise ValueError(f"the controller's forces must have shape {needed}; got {forces.shape}")

@@ -18,29 +18,22 @@ CUTS = 60  # of the time between two looks
 
 def limits_left(run: Trajectory, limits: Mapping[str, Mapping[str, Pair]], units: Mapping[str, str]) -> list[str]:
     """A sentence on every limit of position or velocity that a motion has left: when first, and how far it went."""
-    said, (t, states) = [], _looks(run)
-    parts = {"position": (run.coordinates, 0, ""), "velocity": (run.velocities, len(run.coordinates), "/s")}
-    for what, (names, start, per) in parts.items():
+    said, t, states = list[str](), run.t, (run.q, run.qd)
+    if run.dense is not None and run.dense.steps:
+        t_old, end = (np.concatenate([getattr(block, name) for block in run.dense.steps]) for name in ("t_old", "t"))
+        t = np.append(run.dense.t0, np.column_stack([t_old[:, None] + SHARES * (end - t_old)[:, None], end]))
+        states = run.solution(t)
+    for part, (what, names, per) in enumerate((("position", run.coordinates, ""), ("velocity", run.velocities, "/s"))):
         for name, (lower, upper) in limits.get(what, {}).items():
-            column, unit = start + names.index(name), units[name] + per
-            if (left := _left(run, column, (lower, upper), t, states[:, column])) is not None:
+            k, unit = names.index(name), units[name] + per
+            if (left := _left(run, part, k, (lower, upper), t, states[part][:, k])) is not None:
                 first, value, at = left
                 bounds = f"{what} of {name} leaves {lower:.6g} to {upper:.6g} {unit} at {first:.4g} s"
                 said.append(f"{bounds}, and is {value:.6g} {unit} at {at:.4g} s")
     return said
 
 
-def _looks(run: Trajectory) -> tuple[Array, Array]:
-    """Instants at which a motion is looked at, its rows or some of each step, and q and qd there."""
-    if run.dense is None or not run.dense.steps:
-        return run.t, np.concatenate([run.q, run.qd], axis=1)
-    t_old, end = (np.concatenate([getattr(block, name) for block in run.dense.steps]) for name in ("t_old", "t"))
-    inside = t_old[:, None] + SHARES * (end - t_old)[:, None]
-    t = np.append(run.dense.t0, np.column_stack([inside, end]))
-    return t, np.concatenate(run.solution(t), axis=1)
-
-
-def _left(run: Trajectory, column: int, ends: Pair, t: Array, x: Array) -> tuple[float, float, float] | None:
+def _left(run: Trajectory, part: int, k: int, ends: Pair, t: Array, x: Array) -> tuple[float, float, float] | None:
     """When a coordinate with values x at instants t is beyond its limit first, where it is farthest, and when."""
     rounding = ROUNDING * np.abs(x).max()
 
@@ -48,7 +41,7 @@ def _left(run: Trajectory, column: int, ends: Pair, t: Array, x: Array) -> tuple
         return np.asarray(np.maximum(ends[0] - x, x - ends[1]) - rounding)
 
     def values(t: Array) -> Array:
-        return np.concatenate(run.solution(t), axis=1)[:, column]
+        return run.solution(t)[part][:, k]
 
     over = beyond(x)
     if run.dense is not None:  # look for the turns between the instants
@@ -62,10 +55,10 @@ def _left(run: Trajectory, column: int, ends: Pair, t: Array, x: Array) -> tuple
         t, x = np.append(t, begin), np.append(x, values(begin))
         order = np.argsort(np.abs(t - t[0]), kind="stable")
         t, x, over = t[order], x[order], beyond(x[order])
-    k, most = int(np.argmax(over > 0.0)), int(np.argmax(over))
+    one, most = int(np.argmax(over > 0.0)), int(np.argmax(over))
     if not over[most] > 0.0:
         return None
-    inside, first = float(t[max(k - 1, 0)]), float(t[k])
+    inside, first = float(t[max(one - 1, 0)]), float(t[one])
     for _ in range(CUTS if run.dense is not None else 0):
         middle = 0.5 * (inside + first)
         inside, first = (inside, middle) if beyond(values(np.array([middle])))[0] > 0.0 else (middle, first)

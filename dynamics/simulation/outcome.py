@@ -1,35 +1,33 @@
-"""Outcome: one run made to its end, its rows, its statistics, and the advice of another method."""
+"""Outcome: one run made to its end, its rows, and its statistics."""
 
 from __future__ import annotations
 
 import math
 import time
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph._shared import Array, counted, real_number
+from cgraph._shared import Array, real_number
 
+from ..integrators import Problem
 from .estimates.error_estimate import RunEstimate
-from .run_options import SMALL_MEMORY, TABLES, Span, Steps, room
+from .events.event import EventProgram
+from .events.event_log import Happening
+from .progress_bar import Progress
+from .run_options import SMALL_MEMORY, TABLES, Span, room
 from .stepper import Stepper
 from .steps.dense_output import StepBlock
-from .steps.row_values import converted
+from .steps.row_values import converted, row_values
+from .steps.state_sizes import OTHERS as SMALLEST_SHARE
 from .trajectory import Crossings, SimulationWarning, Stats, Trajectory
 
-if TYPE_CHECKING:
-    from .events.event import EventProgram
-    from .events.event_log import Happening
-
-IMPLICIT = ("radau", "rodas")
-OTHERS = ("radau", "dop853")  # of the rate the first takes no derivative by the time, and the second none at all
-TRIED = 1000  # trials of steps of a method, at most
-LONGER_STEPS = 4.0  # times as long as those of the run are steps that are worth a word
 REACHED = "reached t_end"
+LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it; of a velocity the same
+SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller
 INTERRUPTED = "interrupted"  # what the message of a run that Ctrl-C ended begins with
 
 
@@ -54,8 +52,7 @@ class MotionEnd(NamedTuple):
     t : float
         The end of the run, or the instant of the event that ended it [s].
     q, qd : ndarray
-        The state there, (nq,) and (n,) [rad or m, per second], or (N, nq) and (N, n); of an OdeSystem q is the state,
-        and qd empty.
+        The state there, (nq,) and (n,) [rad or m, per second], or (N, nq) and (N, n); of an OdeSystem q alone.
 
     Examples
     --------
@@ -80,8 +77,7 @@ class InterruptedMotion(KeyboardInterrupt):
 class MotionSteps:
     """A motion as it goes on, made by `Run.start`. One thread at a time may move it.
 
-    By `step` to its end it has the states of the trajectory's rows, to the bit. An instant of `propagate_until` cuts a
-    step, so that those that follow are others, within the same tolerance.
+    By `step` it has the states of the trajectory's rows, to the bit; an instant of `propagate_until` cuts a step.
 
     Attributes
     ----------
@@ -185,16 +181,14 @@ class Recorder:
 
     def add(self, block: StepBlock) -> None:
         """The rows of these steps."""
-        if not len(block.t):
-            return
-        last, following = float(block.t[-1]), self._next
         if self._times is None:
             self._append(block.t, block.x)
         else:
-            following = int(np.searchsorted(self._direction * self._times, self._direction * last, side="right"))
+            following = int(np.searchsorted(self._direction * self._times, self._direction * block.t[-1], side="right"))
             times = self._times[self._next : following]
             self._append(times, block.at(times))
-        self._next, self.last, self._last_state = following, last, block.x[-1].copy()
+            self._next = following
+        self.last, self._last_state = float(block.t[-1]), block.x[-1].copy()
 
     def add_last(self) -> None:
         """Add the state at which a run stopped as its last row, also between the times of t_eval."""
@@ -213,18 +207,12 @@ class Recorder:
 
 
 def outcome(
-    run: Stepper,
-    x: Array,
-    span: Span,
-    again: Callable[[Steps], Stepper] | None = None,
-    steps: list[StepBlock] | None = None,
-    report: Callable[[float], None] | None = None,
+    run: Stepper, x: Array, span: Span, steps: list[StepBlock] | None = None, report: Progress | None = None
 ) -> tuple[Stats, Recorder]:
     """How a run from x (m,) goes, and its rows; steps: receives all; report: is told how far it is [s]."""
     recorder, estimate = Recorder(x, span), RunEstimate(run, x, span)
     begin, kept, most = time.perf_counter(), 0, SMALL_MEMORY
-    error, at_end, end = None, None, None
-    doubts: tuple[str, ...] = ()
+    found: tuple[float | None, float | None, tuple[str, ...]] = None, None, ()
     try:
         with np.errstate(all="ignore"):
             for block in run.blocks(x, span):
@@ -242,53 +230,13 @@ def outcome(
                     run.status = f"stopped at t = {recorder.last:.6g} s: the rows fill the memory; t_eval records fewer"
                     break
             if not run.status:
-                error, at_end, doubts = estimate.result()
-        end = time.perf_counter()
-        advise(run, recorder.last, span, x, again)
+                found = estimate.result()
     except KeyboardInterrupt:
         run.status = f"{INTERRUPTED} after t = {recorder.last:.6g} s"
-    stats = Stats(
-        run.options.method,
-        run.steps,
-        run.rejected,
-        run.evaluations,
-        run.largest,
-        (time.perf_counter() if end is None else end) - begin - estimate.seconds,
-        not run.status,
-        run.status or run.event or REACHED,
-        -1 if run.status else int(bool(run.event)),
-        run.jacobians,
-        run.factorizations,
-        error,
-        at_end,
-        (*run.warnings, *doubts),
-        *run.compiled.prices,
-    )
-    return stats, recorder
-
-
-def advise(run: Stepper, reached: float, span: Span, x: Array, again: Callable[[Steps], Stepper] | None) -> None:
-    """Name a method that does better in the warning of a stiff run, or in the status of one that lacks a derivative."""
-    if not (run.stiff or run.slope) or again is None:
-        return
-    length = LONGER_STEPS * abs(reached - span.t0) / max(run.steps, 1)
-    for name in OTHERS if run.slope else IMPLICIT:
-        t = span.t0
-        try:
-            trial = again(replace(run.options, method=name, max_steps=TRIED))
-            with np.errstate(all="ignore"):
-                for block in trial.blocks(x, Span(span.t_end, t0=span.t0)):
-                    t = float(block.t[-1]) if len(block.t) else t
-        except Exception:  # noqa: BLE001, S112 -- whatever another method lacks: the run that was asked for is done
-            continue
-        text = f"; try method={name!r}, which comes to t = {t:.6g} s in {counted(trial.steps, 'step')}"
-        if run.slope and not trial.status:
-            run.status += text
-            return
-        whole = trial.steps + trial.rejected < TRIED
-        if not run.slope and not (trial.status and whole) and abs(t - span.t0) >= length * trial.steps > 0.0:
-            run.warnings[run.warnings.index(run.stiff)] += text
-            return
+    counts = run.steps, run.rejected, run.evaluations, run.largest, time.perf_counter() - begin - estimate.seconds
+    ended = not run.status, run.status or run.event or REACHED, -1 if run.status else int(bool(run.event))
+    work, (error, at_end, doubts) = (run.jacobians, run.factorizations), found
+    return Stats(run.options.method, *counts, *ended, *work, error, at_end, (*run.warnings, *doubts)), recorder
 
 
 def split_crossings(
@@ -303,3 +251,26 @@ def split_crossings(
         states = converted(program.velocities, times, states, parameters)
         result[event.name] = Crossings(times, states[:, :nq], states[:, nq:])
     return result
+
+
+def unreached_momenta(
+    problem: Problem, times: Array, rows: Array, parameters: ArrayLike = 0.0, *, start: tuple[float, Array, Array]
+) -> list[str]:
+    """Doubts of rows (T, m) of a problem in momenta; start: the instant, q and qd, and the state (m,) they make."""
+    if problem.missing is None or not len(rows):
+        return []
+    said, instead, nq, (t, begin, x) = [], "take form='velocity'", problem.nq, start
+    # Of an L that is not convex several velocities have the same momenta
+    qd, back = begin[nq:], converted(problem.velocities, t, x, parameters)[nq:]
+    off = np.abs(back - qd) > LOOSE * np.maximum(np.abs(qd), SLOW * np.abs(qd).max(initial=0.0))
+    for k in np.flatnonzero(off)[:1] if qd.any() else ():
+        other = f"of the {problem.components[nq + k]} it is {back[k]:.6g} in place of {qd[k]:.6g}"
+        said.append(f"the momenta of the start belong to other velocities too: {other}; {instead}")
+    momenta, missing = rows[:, nq:], row_values(problem.missing, times, rows, parameters)
+    sizes = np.abs(momenta).max(axis=0, initial=0.0)
+    allowed = LOOSE * np.maximum(sizes, SMALLEST_SHARE * sizes.max(initial=0.0))
+    for row, k in np.argwhere(~(np.abs(missing) <= allowed))[:1]:
+        left = f"{missing[row, k]:.2g} of {momenta[row, k]:.2g}, {problem.components[nq + k]}"
+        text = f"at t = {times[row]:.6g} s the velocities do not have the momenta: the iteration leaves {left}"
+        said.append(f"{text}; {instead}")
+    return said

@@ -13,7 +13,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph._shared import Array, nearest, or_nearest, real_array, real_number, require_flag
+from cgraph._shared import Array, nearest, or_nearest, real_array, real_number, require_choice, require_flag
 
 from ..equations.states.initial_value import times_to_record
 from ..integrators import METHODS, MOST_STAGES, Method
@@ -39,38 +39,31 @@ class Options(TypedDict, total=False):
     t_span : array_like
         (t0, t_end), as in SciPy, in place of the two.
     dt : float
-        The largest of equal steps [s], 1e-3 by default: the steps between two recorded times are equal, so that the
-        last row is at t_end exactly.
+        The largest of equal steps [s], 1e-3 by default: the steps between two recorded times are equal.
     max_step : float
         The longest of chosen steps [s]; no limit by default.
     rtol, atol : float, float or array_like
         The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
-        one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
-        component has had so far, or a ten-thousandth of the largest coordinate or velocity, in whatever unit: of a
-        mechanism an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1.
-        A jump of a force in time is passed then, as well as a hundredth of the longest of the last steps allows. Of
-        equal steps the estimated error that is no cause of a warning, relative to the largest of a component over the
-        run; 1e-3 and 0 by default.
+        one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the component has
+        had so far, or a ten-thousandth of the largest coordinate or velocity. Of equal steps the estimated error that
+        is no cause of a warning, relative to the largest of a component over the run; 1e-3 and 0 by default.
     first_step : float
         In place of the first step that the method chooses [s].
     max_steps : float
         Trials of steps, rejected ones too, after which the run stops.
     estimate_error : bool
-        Of equal steps, whether runs beside, of steps two and four times as long, estimate their error
-        (`Stats.error`), which takes three quarters as long again; by default they do, but with a `SampledController`,
-        with which they cannot. The rows are the same without.
+        Of equal steps, whether runs of steps two and four times as long estimate their error (`Stats.error`), which
+        takes three quarters as long again; by default they do, but never with a `SampledController`.
     dense_output : bool
-        Whether to keep what lies between the rows, for `Trajectory.solution(t)`: some numbers a step for every one of
-        the state.
+        Whether to keep what lies between the rows, for `Trajectory.solution(t)`.
     form : {"velocity", "momentum"}
         What the steps are of: q and qd, or q and the momenta p = dL/dqd by Hamilton's equations, on which symplectic
-        methods then act as they are written. Events, controllers, rows and dense output are in q and qd all the same,
-        and the rows have p besides; `atol` of (m,) is for q and then p. Not with constraints.
+        methods then act as they are written. All else is in q and qd, but `atol` of (m,) is for q and then p; the rows
+        have p besides. Not with constraints.
     backend : {"auto", "llvm", "python"}
-        "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
+        Machine code or Python; "auto" is machine code where llvmlite is installed. The steps are the same.
     fma : bool
-        Whether the steps may fuse a product and a sum where the processor can, as in `cgraph.compile`. Without they
-        have the bits that they have in Python, in C and on any other machine with the same C library.
+        Whether products and sums may be fused, as in `cgraph.compile`; without, bits are the same on any machine.
     progress : bool
         A progress line on standard error; by default on a terminal, for runs over a second.
 
@@ -124,20 +117,41 @@ class Steps:
     absolute: float | Array = field(init=False)  # atol, a number or (m,), or what it is by default
 
     def __post_init__(self) -> None:
-        check_method(self.method)
-        adaptive = METHODS[self.method].adaptive
-        if not isinstance(self.backend, str):
-            raise TypeError(f"backend must be a string, got {type(self.backend).__name__}: {self.backend!r:.40}")
+        if not isinstance(self.method, str):
+            raise TypeError(f"method must be one of {', '.join(METHODS)}, got {self.method!r:.60}")
+        if self.method not in METHODS:
+            hint = f"Gauss methods are gauss2, gauss4, .. up to gauss{2 * MOST_STAGES}"
+            if not self.method.startswith("gauss"):
+                near = " or ".join(map(repr, nearest(self.method, METHODS)))
+                hint = f"did you mean {near}?" if near else f"there are {', '.join(METHODS)}"
+            raise ValueError(f"there is no method {self.method!r:.60}; {hint}")
+        adaptive, who = METHODS[self.method].adaptive, f"method {self.method!r}"
+        require_choice("backend", self.backend, ("auto", "llvm", "python"))
         require_flag("fma", self.fma)
-        self._check_lengths(adaptive)
+        for what in ("dt", "max_step", "first_step"):
+            if (value := getattr(self, what)) is None:
+                continue
+            if not (math.isfinite(real_number(what, value)) and value > 0.0):
+                raise ValueError(f"{what} must be positive and finite, got {value!r} s")
+            if adaptive and what == "dt":
+                other = f"equal steps of dt = {value:g} s need method='rk4'"
+                raise ValueError(f"{who} chooses its steps: max_step limits them; {other}")
+            if not adaptive and what != "dt":
+                raise ValueError(f"{who} makes equal steps: set them by dt, not by {what} (got {what} = {value:g} s)")
         rtol, atol = (RTOL, ATOL) if adaptive else (ERROR_BOUND, 0.0)
         rtol = rtol if self.rtol is None else real_number("rtol", self.rtol)
         absolute = np.asarray(atol if self.atol is None else real_array("atol", self.atol))
         if not (rtol >= 0.0 and np.all((absolute >= 0.0) & (absolute + rtol > 0.0) & (absolute + rtol < math.inf))):
-            raise ValueError(
-                f"rtol and atol must be finite, not negative and not both 0, got {rtol!r} and {absolute.tolist()!r}"
-            )
-        self._check_estimate(adaptive)
+            given = f"got {rtol!r} and {absolute.tolist()!r}"
+            raise ValueError(f"rtol and atol must be finite, not negative and not both 0, {given}")
+        for name in ("estimate_error", "progress"):
+            if not isinstance(value := getattr(self, name), bool | None):
+                raise TypeError(f"{name} must be True, False or None, got {value!r:.40}")
+        if adaptive and self.estimate_error:
+            raise ValueError(f"{who} keeps the error of its steps within rtol: estimate_error is for equal steps")
+        for what in ("rtol", "atol") if not adaptive and self.estimate_error is False else ():
+            if getattr(self, what) is not None:
+                raise ValueError(f"{what} is a bound of the estimated error, which estimate_error=False leaves out")
         most = real_number("max_steps", self.max_steps)
         if not (most >= 1.0 and (most == math.inf or most == int(most))):
             raise ValueError(f"max_steps must be a whole number, at least 1, or infinite, got {self.max_steps!r}")
@@ -150,36 +164,6 @@ class Steps:
             relative=rtol,
             absolute=absolute if absolute.ndim else float(absolute),
         )
-
-    def _check_lengths(self, adaptive: bool) -> None:
-        for what in ("dt", "max_step", "first_step"):
-            if (value := getattr(self, what)) is None:
-                continue
-            if not (math.isfinite(real_number(what, value)) and value > 0.0):
-                raise ValueError(f"{what} must be positive and finite, got {value!r} s")
-            if adaptive and what == "dt":
-                raise ValueError(
-                    f"method {self.method!r} chooses its steps: max_step limits them; "
-                    f"equal steps of dt = {value:g} s need method='rk4'"
-                )
-            if not adaptive and what != "dt":
-                raise ValueError(
-                    f"method {self.method!r} makes equal steps: set them by dt, not by {what} "
-                    f"(got {what} = {value:g} s)"
-                )
-
-    def _check_estimate(self, adaptive: bool) -> None:
-        for name in ("estimate_error", "progress"):
-            if not isinstance(value := getattr(self, name), bool | None):
-                raise TypeError(f"{name} must be True, False or None, got {value!r:.40}")
-        if adaptive and self.estimate_error:
-            raise ValueError(
-                f"method {self.method!r} keeps the error of its steps within rtol and atol: "
-                "estimate_error is for equal steps, such as those of method='rk4'"
-            )
-        for what in ("rtol", "atol") if not adaptive and self.estimate_error is False else ():
-            if getattr(self, what) is not None:
-                raise ValueError(f"{what} is a bound of the estimated error, which estimate_error=False leaves out")
 
     @property
     def integrator(self) -> Method:
@@ -195,18 +179,11 @@ class Steps:
         """Raises ValueError where atol has not one number for each state, or equal steps would not move the time."""
         m, shape = len(states), np.shape(self.absolute)
         if shape not in ((), (m,)):
-            raise ValueError(
-                f"atol must be one number, or have shape ({m},), one for each of {', '.join(states)}; got {shape}"
-            )
+            needed = f"or have shape ({m},), one for each of {', '.join(states)}"
+            raise ValueError(f"atol must be one number, {needed}; got {shape}")
         name, latest = ("t0", span.t0) if abs(span.t0) > abs(span.t_end) else ("t_end", span.t_end)
         if not self.adaptive and self.step < RESOLUTION * abs(latest):
             raise ValueError(f"dt = {self.step:g} s is below the resolution of the time at {name} = {latest:g} s")
-
-    def check_room(self, span: Span, m: int) -> None:
-        """Raises MemoryError where every equal step as a row of m numbers would not fit."""
-        if not (self.adaptive or span.times is not None):
-            count = step_count(span.length, self.step)
-            require_room(8 * TABLES * count * m, f"{count} steps of {m} numbers", "record fewer times (t_eval)")
 
 
 @dataclass(frozen=True)
@@ -220,6 +197,7 @@ class Span:
     times: Array | None = field(init=False)  # t_eval, (T,); None for every step
     between: bool = field(init=False)  # whether times lie between the ends
     direction: float = field(init=False)  # 1.0, or -1.0 for a run back in time
+    length: float = field(init=False)  # [s]
 
     def __post_init__(self) -> None:
         t0, t_end = real_number("t0", self.t0), real_number("t_end", self.t_end)
@@ -231,12 +209,7 @@ class Span:
         times = None if self.t_eval is None else times_to_record(self.t_eval, t_end, t0)
         inside = times is not None and not {*times.tolist()} <= {t0, t_end}
         vars(self).update(t0=t0, t_end=t_end, t_eval=times, times=times, between=inside)
-        vars(self).update(direction=math.copysign(1.0, t_end - t0))
-
-    @property
-    def length(self) -> float:
-        """How long the run is [s]."""
-        return abs(self.t_end - self.t0)
+        vars(self).update(direction=math.copysign(1.0, t_end - t0), length=abs(t_end - t0))
 
     @property
     def instants(self) -> list[float]:
@@ -253,19 +226,6 @@ class RunOptions(Steps, Span):
         Steps.__post_init__(self)
         Span.__post_init__(self)
 
-    @classmethod
-    def of(
-        cls,
-        method: str,
-        options: Mapping[str, Any],
-        t0: float,
-        t_end: float,
-        t_eval: ArrayLike | None = None,
-        without: Sequence[str] = (),
-    ) -> RunOptions:
-        """Those of a method and keywords of `Options`, but some."""
-        return cls(t_end, method, t0=t0, t_eval=t_eval, **known_options(options, without))
-
     @property
     def row_times(self) -> Array:
         """Times of the rows of equal steps, t_eval or every step, (T,)."""
@@ -281,18 +241,6 @@ def known_options(options: Mapping[str, Any], without: Sequence[str] = ()) -> Ma
         known = [name for name in Options.__annotations__ if name not in without]
         raise TypeError(f"there is no option {unknown[0]!r:.60} here; {or_nearest(unknown[0], known)}")
     return options
-
-
-def check_method(method: str) -> None:
-    """Raises TypeError or ValueError for what is no method."""
-    if not isinstance(method, str):
-        raise TypeError(f"method must be one of {', '.join(METHODS)}, got {method!r:.60}")
-    if method not in METHODS:
-        if method.startswith("gauss"):
-            raise ValueError(f"Gauss methods are gauss2, gauss4, .. up to gauss{2 * MOST_STAGES}, got {method!r:.60}")
-        near = " or ".join(map(repr, nearest(method, METHODS)))
-        hint = f"did you mean {near}?" if near else f"there are {', '.join(METHODS)}"
-        raise ValueError(f"there is no method {method!r:.60}; {hint}")
 
 
 def time_span(t_end: float | None, t0: float, t_span: ArrayLike | None) -> tuple[float, float]:
@@ -316,15 +264,10 @@ def require_room(size: float, what: str, instead: str) -> None:
 
 
 def room() -> float:
-    """Bytes that a result may take."""
-    return MEMORY_SHARE * _free()
-
-
-def _free() -> float:
-    """Bytes that can be taken without swapping; where the system does not say, all there are, or no limit."""
+    """Bytes that a result may take without swapping; where the system does not say, of all there are, or no limit."""
     with suppress(OSError, StopIteration):  # Linux
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-        return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
+        return MEMORY_SHARE * 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
     with suppress(OSError, ValueError, AttributeError):  # macOS
-        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+        return MEMORY_SHARE * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return math.inf

@@ -6,7 +6,7 @@ import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -42,37 +42,33 @@ class StoppedError(Exception):
     """Nobody waits for the rest of the run any more."""
 
 
+@dataclass(eq=False)
 class Stepper(ABC):
     """Runs of a method in one memory: recorded, by `blocks`, or unrecorded, from `begin` by `advance`.
 
     status: why it stopped before the end, or empty.  event: the one that has ended it, in words.  largest: step [s].
-    warnings: what speaks against the result; stiff: that one by which steps are held at a stability limit.
-    slope: that of the rate, in words, which is not finite where the run stopped, and which the method needs.
     """
 
-    def __init__(
-        self,
-        compiled: CompiledSteps,
-        options: Steps,
-        parameters: Sequence[float] = (),
-        control: Hold | None = None,
-        events: EventProgram | None = None,
-        stopped: Callable[[], bool] = lambda: False,
-        *,
-        every_step: bool = False,
-    ) -> None:
-        """every_step: whether all steps are in blocks, also where rows and checks need the last of a block alone."""
-        self.compiled, self.program, self.runner, self.options = compiled, compiled.program, compiled.runner, options
-        self.control, self.events, self.stopped, self.every_step = control, events, stopped, every_step
-        self._at, self._passes, self.parameters = compiled.places, FIRST_PASSES, list[float]()
-        self._stop, self._relative = self._at[str(self.runner.program.stop)], max(options.relative, self.program.finest)
+    compiled: CompiledSteps
+    options: Steps
+    parameters: Sequence[float] = ()
+    _: KW_ONLY
+    control: Hold | None = None
+    events: EventProgram | None = None
+    stopped: Callable[[], bool] = lambda: False  # asked before every block
+    every_step: bool = False  # whether all are in blocks, also where rows and checks need the last of a block alone
+
+    def __post_init__(self) -> None:
+        self.program, self.runner = self.compiled.program, self.compiled.runner
+        self._at, self._stop = self.compiled.places, self.compiled.places[str(self.runner.program.stop)]
+        self._passes, self._relative = FIRST_PASSES, max(self.options.relative, self.program.finest)
         self._start, self._memory = np.zeros(self.runner.size), np.zeros(self.runner.size)
         self._numbers: Any = self._memory.data  # whose items are read and written faster
         self._zero: Any = self._start.data
-        for name, value in first_registers(self.program, options).items():
+        for name, value in first_registers(self.program, self.options).items():
             self.runner.write(self._start, name, value)
-        if control is None:
-            self.set_parameters(parameters)
+        if self.control is None:
+            self.set_parameters(self.parameters)
         self.x = self.runner.read(self._memory, "x")
         self.q, self.qd = self.x[: self.program.nq], self.x[self.program.nq :]
         self._halves: Any = (self.q.data, self.qd.data)
@@ -82,8 +78,8 @@ class Stepper(ABC):
         """Forget the run before."""
         self.steps = self.rejected = self.evaluations = self.jacobians = self.factorizations = self.resets = 0
         self._before = dict.fromkeys(COUNTED, 0)  # the last reset
-        self.largest, self.warnings, self._is_told = 0.0, list[str](), False
-        self.status = self.event = self.stiff = self.slope = ""
+        self.largest, self.warnings, self._is_stiff, self._is_told = 0.0, list[str](), False, False
+        self.status = self.event = ""
         self.log = None if self.events is None else EventLog(self.events)
 
     @property
@@ -122,15 +118,16 @@ class Stepper(ABC):
         t, looked, log = span.t0, self._is_looked_at(span), self.log
         while True:
             self.begin(x, t, span.t_end)
-            for made in self._recorded(span, looked):
-                block = made
-                if log is not None:
-                    log.parameters = self.parameters
-                    block = log(self.with_dense(made))
-                    self.steps -= len(made.t) - len(block.t)
-                if len(block.t):
+            for block in self._recorded(span, looked):
+                if log is None:
                     yield block
-                if log is not None and (log.ended or log.restart):
+                    continue
+                log.parameters = self.parameters
+                cut = log(self.with_dense(block))
+                self.steps -= len(block.t) - len(cut.t)
+                if len(cut.t):
+                    yield cut
+                if log.ended or log.restart:
                     self.status = ""  # of a step beyond
                     break
             if log is None:
@@ -172,9 +169,11 @@ class Stepper(ABC):
     def _begin(self, t0: float, t_end: float) -> None:
         """Set the registers of a span."""
 
-    @abstractmethod
     def _is_looked_at(self, span: Span) -> bool:
         """Whether a run over this span has to have every step in a block."""
+        estimated, held = self.options.estimated, self.program.rows is not None
+        own = span.between or held or self.options.relative < self._relative if self.program.adaptive else estimated
+        return own or self.every_step or span.times is None or self.events is not None
 
     @abstractmethod
     def _recorded(self, span: Span, looked: bool) -> Iterator[StepBlock]:
@@ -232,10 +231,11 @@ class Stepper(ABC):
     def _too_many(self) -> str:
         return f"stopped at t = {self.t:.6g} s after max_steps = {self.options.max_steps:g} steps"
 
-    def _hold(self, control: Hold) -> None:
-        """Take the forces of the period of control that begins."""
+    def _hold(self, control: Hold, t_end: float) -> float:
+        """Take the forces of the period of control that begins; when it ends, or the run."""
         self.parameters = control.at(self.t, self.x)
         self.runner.write(self._memory, "p", self.parameters)
+        return next(control.ends(self.t, t_end))
 
     def _number(self, name: str) -> float:
         return float(self._numbers[self._at[name]])
@@ -254,9 +254,6 @@ class EqualStepper(Stepper):
         self._set(t=t0)
         self._left = 0
 
-    def _is_looked_at(self, span: Span) -> bool:
-        return self.every_step or self.options.estimated or span.times is None or self.events is not None
-
     def beside(self, dt: float, stretches: Sequence[EqualSteps] = ()) -> EqualStepper:
         """The stepper of steps of at most dt that meet the end of the run alone, or of stretches, without events."""
         options, events = replace(self.options, dt=dt, max_steps=math.inf), None if stretches else self.events
@@ -271,7 +268,7 @@ class EqualStepper(Stepper):
         for stretch in self.stretches or equal_steps(instants, self.options.step):
             self._enter(stretch)
             if self.control is not None:
-                self._hold(self.control)
+                self._hold(self.control, stretch.end)
             while self._left:
                 if self.steps >= most:
                     self.status = self._too_many()
@@ -314,9 +311,11 @@ class EqualStepper(Stepper):
         failed = self._memory.copy()
         self._memory[:] = before
         rows = self.runner.run(self._memory, steps, 1 if looked else max(1, steps))[0]
-        singular, t = (failed[self._at[name]] if name in self._at else 0.0 for name in ("singular", "t"))
-        x = self.runner.read(failed, "x")
-        self.status = failed_step(self.program.components, float(t), self.x, x, int(singular))
+        names, x = self.program.components, self.runner.read(failed, "x")
+        reason = nonfinite(names, x) or unsolved(names, self.x, x)
+        if "singular" in self._at and (number := int(failed[self._at["singular"]])):
+            reason = f"{names[number - 1]} has an inertia that is not positive"
+        self.status = f"stopped at t = {failed[self._at['t']]:.6g} s: {reason}"
         self._set(evaluations=failed[self._at["evaluations"]])
         return rows
 
@@ -330,15 +329,11 @@ class ChosenStepper(Stepper):
         numbers, at = self._numbers, self._at
         self._t0 = numbers[at["t"]] = t0
         numbers[at[END]] = t_end
-        numbers[at[GOAL]] = t_end if self.control is None else self._period_end(self.control, t_end)
+        numbers[at[GOAL]] = t_end if self.control is None else self._hold(self.control, t_end)
         if self.program.timed:
             numbers[at[INSTANT]] = instant(t0, t_end)
         if self.program.rows is not None:
             self._flat = FlatPosition(self.program, t0, self.x, self.parameters)
-
-    def _is_looked_at(self, span: Span) -> bool:
-        asked = self.every_step or span.times is None or span.between or self.events is not None
-        return asked or self.options.relative < self._relative or self.program.rows is not None
 
     def _recorded(self, span: Span, looked: bool) -> Iterator[StepBlock]:
         if self.resets:
@@ -347,20 +342,19 @@ class ChosenStepper(Stepper):
         while True:
             left = most - self._number("trials")
             if left <= 0:
-                self.status = self._too_many() + self._near_flat()
+                self.status = self._too_many() + (self._flat.near() if self._flat else "")
                 return
             absolute = self.runner.read(self._memory, TOLERANCE).copy()
             rows = self._rows(int(min(left, CREEP if self._flat else 2**31)), looked)[0]
             if not looked:
                 made = self._number("longest_made") != 0.0
                 rows = np.array([[self.t, self.t - self._number("t_old"), *self.x.tolist()]][: int(made)])
-            status = self._numbers[self._stop]
             self._count_trials()
             if len(rows):
                 self._look(rows, absolute)
                 yield self._block(rows)
             self._judge(rows)
-            if self.status or (status == DONE and not self._next_period(span)):
+            if self.status or (self._numbers[self._stop] == DONE and not self._next_period(span)):
                 return
 
     def _count_trials(self) -> None:
@@ -383,17 +377,11 @@ class ChosenStepper(Stepper):
         numbers, at = self._numbers, self._at
         numbers[at[GOAL] if numbers[at["anew"]] else at["end"]] = t
         numbers[self._stop] = RUNNING
-        if single:
+        self._repeat(1 if single else 2**62)
+        while single and numbers[at["row"]] <= 0.0 and numbers[self._stop] == RUNNING:
             self._repeat(1)
-            while numbers[at["row"]] <= 0.0 and numbers[self._stop] == RUNNING:
-                self._repeat(1)
-        else:
-            self._repeat(2**62)
         if self._flat or numbers[self._stop] != DONE:
             self._judge()
-
-    def _near_flat(self) -> str:
-        return "" if self._flat is None else self._flat.near()
 
     def _judge(self, rows: Array | None = None) -> None:
         """Note why the run stops after these steps, if it does; without rows, after the last."""
@@ -404,12 +392,7 @@ class ChosenStepper(Stepper):
             reason = self._flat.reason(last, self.steps, self._number("farthest"), self.largest)
             self.status = f"stopped at t = {self.t:.6g} s: {reason}" if reason else ""
         if stop == TOO_SMALL:
-            self.status = self._too_small() + self._near_flat()
-
-    def _period_end(self, control: Hold, t_end: float) -> float:
-        """The end of the period of control that begins, for which its forces are taken."""
-        self._hold(control)
-        return next(control.ends(self.t, t_end))
+            self.status = self._too_small() + (self._flat.near() if self._flat else "")
 
     def _next_period(self, span: Span) -> bool:
         """Whether the run is not over yet; the memory is then at the start of the next period of a controller."""
@@ -417,7 +400,7 @@ class ChosenStepper(Stepper):
             return False
         wanted = self._number("next")
         wanted = wanted if math.isfinite(wanted) else span.length  # Taylor's method chooses it by itself
-        self._set(end=self._period_end(self.control, span.t_end), next=wanted, fresh=1.0, status=RUNNING)
+        self._set(end=self._hold(self.control, span.t_end), next=wanted, fresh=1.0, status=RUNNING)
         return True
 
     def _block(self, rows: Array) -> StepBlock:
@@ -431,13 +414,12 @@ class ChosenStepper(Stepper):
     def _look(self, rows: Array, absolute: Array) -> None:
         """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
         options, held = self.options, int(self._number("at_limit"))
-        if held >= HELD and held >= SHARE * (self.steps - self._before["steps"]) and not self.stiff:
-            t, h = rows[-1, :2]
-            self.stiff = (
+        if held >= HELD and held >= SHARE * (self.steps - self._before["steps"]) and not self._is_stiff:
+            self._is_stiff, (t, h) = True, rows[-1, :2]
+            self.warnings.append(
                 f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
-                f"method {options.method!r}, not by its tolerance"
+                f"method {options.method!r}, not by its tolerance; for such are method='radau' and method='rodas'"
             )
-            self.warnings.append(self.stiff)
         if options.relative < self._relative and not self._is_told:
             size = np.abs(rows[:, 2 : 2 + self.program.size])
             short = (absolute + options.relative * size < self._relative * size).any(axis=0)
@@ -456,9 +438,13 @@ class ChosenStepper(Stepper):
         if not np.isfinite(rate).all():
             first = self.program.components[int(np.flatnonzero(~np.isfinite(rate))[0])]
             return f"{where}the rate of {first} is not finite{' at the start' if t == self._t0 else ''}"
-        self.slope = self._lacking()
-        if self.slope:
-            return f"{where}{self.slope} is not finite, and method {self.options.method!r} takes it"
+        names, lengths = self.program.components, self.runner.program.registers
+        for register, by in (("time_slope", ["the time"]), ("jacobian", names)):
+            values = self.runner.read(self._memory, register) if lengths.get(register) else np.zeros(0)
+            if len(bad := np.flatnonzero(~np.isfinite(values))):
+                row, column = divmod(int(bad[0]), len(by))
+                slope = f"the derivative of the rate of {names[row]} by {by[column]} is not finite"
+                return f"{where}{slope}; method {self.options.method!r} takes it, method='dop853' takes none"
         if reason := nonfinite(self.program.components, self.runner.read(self._memory, "x_new")):
             return f"{where}{reason}, however small"
         scale = self.runner.read(self._memory, TOLERANCE) + self._relative * np.abs(x)
@@ -466,39 +452,20 @@ class ChosenStepper(Stepper):
         h = self._number("tried")
         return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
 
-    def _lacking(self) -> str:
-        """The first derivative of the rate that the method takes and that is not finite; empty if all are."""
-        lengths, names = self.runner.program.registers, self.program.components
-        for register, by in (("time_slope", ["the time"]), ("jacobian", names)):
-            values = self.runner.read(self._memory, register) if lengths.get(register) else np.zeros(0)
-            if len(bad := np.flatnonzero(~np.isfinite(values))):
-                row, column = divmod(int(bad[0]), len(by))
-                return f"the derivative of the rate of {names[row]} by {by[column]}"
-        return ""
-
 
 def first_registers(program: StepProgram, options: Steps) -> dict[str, ArrayLike]:
     """Registers with which a run begins, besides state, parameters and span."""
     if not program.adaptive:
         return {"fresh": 1.0} if "fresh" in program.steps.registers else {}
     limits = {"longest_step": options.longest_step, "first": options.first_step or 0.0}
-    sizes = {"sized": float(options.atol is None), TOLERANCE: np.maximum(options.absolute, SMALLEST_ATOL)}
-    return {**sizes, **given({"relative": max(options.relative, program.finest), **limits})}
+    own = given({"relative": max(options.relative, program.finest), **limits})
+    return {**own, "sized": float(options.atol is None), TOLERANCE: np.maximum(options.absolute, SMALLEST_ATOL)}
 
 
 def span_registers(span: Span) -> dict[str, float]:
     """Registers of a span of chosen steps."""
     ends = {"t_end": span.t_end, "goal": span.t_end, "instant": instant(span.t0, span.t_end)}
     return {"t": span.t0, **given(ends)}
-
-
-def failed_step(components: Sequence[str], t: float, before: Array, x: Array, singular: int) -> str:
-    """Reason why a step from a state to x (m,) failed; singular: number, from 1, of the component without inertia."""
-    if singular:
-        reason = f"{components[singular - 1]} has an inertia that is not positive"
-    else:
-        reason = nonfinite(components, x) or unsolved(components, before, x)
-    return f"stopped at t = {t:.6g} s: {reason}"
 
 
 def nonfinite(components: Sequence[str], state: Array) -> str:
@@ -514,31 +481,13 @@ def unsolved(components: Sequence[str], before: Array, x: Array) -> str:
     return f"the equations of the step did not converge; the step is too long, first of all for {first}"
 
 
-def stepper_of(
-    problem: Problem,
-    options: Steps,
-    parameters: Sequence[float] = (),
-    control: Hold | None = None,
-    *,
-    events: EventProgram | None = None,
-    dense: bool,
-) -> Stepper:
+def stepper_of(problem: Problem, options: Steps, parameters: Sequence[float], *, dense: bool, **named: Any) -> Stepper:
     """The stepper of a problem. dense: with all steps, and the dense output of chosen ones."""
     program = step_program(problem, options.integrator, dense=dense)
     compiled = compile_steps(program, options.backend, options.fma)
-    return stepper(compiled, options, parameters, control, every_step=dense, events=events)
+    return stepper(compiled, options, parameters, every_step=dense, **named)
 
 
-def stepper(
-    compiled: CompiledSteps,
-    options: Steps,
-    parameters: Sequence[float] = (),
-    control: Hold | None = None,
-    stopped: Callable[[], bool] = lambda: False,
-    *,
-    every_step: bool = False,
-    events: EventProgram | None = None,
-) -> Stepper:
-    """The stepper of compiled steps."""
-    kind = ChosenStepper if compiled.program.adaptive else EqualStepper
-    return kind(compiled, options, parameters, control, events, stopped, every_step=every_step)
+def stepper(compiled: CompiledSteps, *arguments: Any, **named: Any) -> Stepper:
+    """The stepper of compiled steps, with the other arguments of `Stepper`."""
+    return (ChosenStepper if compiled.program.adaptive else EqualStepper)(compiled, *arguments, **named)

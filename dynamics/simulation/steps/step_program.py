@@ -14,7 +14,6 @@ from cgraph._shared import kept_by_first, memo
 from cgraph.extend import Call, Factor, If, Program, Runner, Statement, runner
 
 from ...integrators import Method, Problem
-from ...integrators.jacobian_statements import prices
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
 from .first_step import with_first_step
@@ -68,11 +67,6 @@ class CompiledSteps:
     def factorizations(self) -> int:
         """LU factorizations in a trial of a step."""
         return sum(isinstance(statement, Factor) for statement in self.program.steps.statements())
-
-    @cached_property
-    def prices(self) -> tuple[float, float]:
-        """Prices of an evaluation of the Jacobian and of a factorization, in evaluations of the rate."""
-        return prices(self.program.steps, self.program.rate) if self.factorizations else (0.0, 0.0)
 
 
 @kept_by_first

@@ -107,7 +107,7 @@ def test_gauss_takes_any_even_order() -> None:
         assert errors[1] < max(errors[0] * 0.6 * 2.0**-order, ROUNDING * 4.0) * 2.0
     for name in ("gauss", "gauss0", "gauss5", "gauss04", "gauss26", "gauss-2", "gauss²"):
         assert name not in METHODS
-        with pytest.raises(ValueError, match=r"Gauss methods are gauss2, gauss4, .. up to gauss24, got"):
+        with pytest.raises(ValueError, match=r"Gauss methods are gauss2, gauss4, .. up to gauss24$"):
             dyn.simulate(planet(), *PERIHELION, 1.0, name)
     assert "gauss20" not in list(METHODS)  # looked up, not listed
 
