@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph._shared import Array, HoldsNodes, or_nearest, real_array, real_number
+from cgraph._shared import Array, HoldsNodes, real_array, real_number
 
 from ..systems.controller import with_closed_form
 from ..systems.model import Equations, Model, as_equations
@@ -22,9 +23,9 @@ from .steps.equal_steps import SAME_INSTANT
 class SampledController(HoldsNodes):
     """A controller as a computer runs it: called at the start of every period, its forces held until the next.
 
-    Steps end where periods do, with every method, so that none goes over a jump of the forces. A reset by an event
-    leaves the forces and the periods as they are. The function may remember what it has seen, such as an integral of
-    the error: it is called once a period, in the order of time. What it raises ends the run, with the time as a note.
+    Steps end where periods do. A reset by an event leaves the forces and the periods as they are. The function may
+    remember what it has seen: it is called once a period, in the order of time. What it raises ends the run, with the
+    time as a note. The error of equal steps is not estimated: run again with half of dt and compare.
 
     Parameters
     ----------
@@ -83,8 +84,7 @@ class HeldForces(NamedTuple):
         """The forces at times (T,), (T, n); at the end of a period those of the next, NaN before the first."""
         times = real_array("t", t)
         none = np.full((1, self.tau.shape[1]), np.nan)
-        rows: Array = np.concatenate([none, self.tau])[np.searchsorted(self.t, times + _rounding(times), side="right")]
-        return rows
+        return np.asarray(np.concatenate([none, self.tau])[np.searchsorted(self.t, times + _rounding(times), "right")])
 
 
 Constant: TypeAlias = float | Sequence[float]
@@ -92,23 +92,16 @@ Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledContr
 
 
 class Applied(NamedTuple):
-    """A model with the forces of a controller in closed form, and what is applied to it besides.
-
-    constant: numbers.  nodes: tau, of the state, t, tau0, .. and parameters; None of a first-order system.
-    controller: a sampled one.
-    """
+    """A model with the forces of a controller in closed form, and what is applied to it besides."""
 
     model: Equations
-    constant: Any
-    nodes: Sequence[Node] | None
+    constant: Any  # numbers
+    nodes: Sequence[Node] | None  # tau, of the state, t, tau0, .. and parameters; None of a first-order system
     controller: SampledController | None = None
 
 
 def with_applied(model: Model, tau: Any, parameters: Mapping[str, Any] | None) -> Applied:
-    """The system that moves and its applied force.
-
-    parameters: of the run; those that the model does not have are the controller's.
-    """
+    """The system that moves and its applied force; parameters that the model does not have are the controller's."""
     moving = as_equations(model)
     if isinstance(tau, SampledController):
         if moving.system is None:
@@ -117,79 +110,58 @@ def with_applied(model: Model, tau: Any, parameters: Mapping[str, Any] | None) -
     return Applied(*with_closed_form(moving, tau, parameters))
 
 
-def check_varied(model: Equations, tau: Tau, varied: Sequence[str]) -> None:
-    """Raise for parameters that cannot be varied. Those of a controller that is a function are what a run gives it."""
-    if varied and isinstance(tau, SampledController):
-        raise ValueError(f"varied = {varied} cannot be with a SampledController, which holds its forces")
-    if unknown := [name for name in varied if name not in model.parameters and not callable(tau)]:
-        known = or_nearest(unknown[0], list(model.parameters))
-        raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
-
-
+@dataclass(eq=False)
 class Hold:
-    """The forces of a controller along a run that starts at t0: those so far, and the times of the next.
+    """The forces of a controller along a run; observed: qd of a state (q, p), t and forces, where states have p."""
 
-    velocities: their names.  nq: of the numbers of a state, the coordinates.  observed: qd of a state (q, p), t and
-    forces; None where states have qd.  times, forces: one for each period.
-    """
-
-    def __init__(
-        self,
-        controller: SampledController,
-        velocities: Sequence[str],
-        nq: int,
-        t0: float,
-        observed: Callable[[Array], Array] | None = None,
-    ) -> None:
-        self.controller, self.velocities, self.nq, self.t0, self.observed = controller, velocities, nq, t0, observed
-        self.times: list[float] = []
-        self.forces: list[list[float]] = []
+    controller: SampledController
+    velocities: Sequence[str]
+    nq: int
+    t0: float
+    observed: Callable[[Array], Array] | None = None
+    times: list[float] = field(default_factory=list)
+    forces: list[list[float]] = field(default_factory=list)
 
     def at(self, t: float, x: Array) -> list[float]:
         """The forces from t on, (n,); x: the state, (m,)."""
-        if t >= self._start(len(self.times)) - _rounding(t):
+        if t >= self.t0 + len(self.times) * self.controller.period - _rounding(t):
             self.forces.append(self._called(t, x))
             self.times.append(t)
         return self.forces[-1]
 
     def ends(self, t: float, t_end: float) -> Iterator[float]:
         """The ends of periods from t on, without those at t and t_end but for rounding; then t_end."""
-        number = max(0, math.floor((t - self.t0) / self.controller.period) - 1)
-        while (end := self._start(number)) < t_end - _rounding(t_end):
+        for number in itertools.count(max(0, math.floor((t - self.t0) / self.controller.period) - 1)):
+            end = self.t0 + number * self.controller.period
+            if end >= t_end - _rounding(t_end):
+                break
             if end > t + _rounding(t):
                 yield end
-            number += 1
         yield t_end
 
     def instants(self, instants: Sequence[float]) -> list[float]:
         """The instants that equal steps have to meet, with the ends of periods between them."""
-        result = [instants[0]]
-        for instant in instants[1:]:
-            result += self.ends(result[-1], instant)
-        return result
+        return [instants[0], *[end for pair in itertools.pairwise(instants) for end in self.ends(*pair)]]
 
     @property
     def held(self) -> HeldForces:
         """The forces so far."""
         return HeldForces(np.array(self.times), np.array(self.forces).reshape(-1, len(self.velocities)))
 
-    def _start(self, number: int) -> float:
-        """The start of a period [s]."""
-        return self.t0 + number * self.controller.period
-
     def _called(self, t: float, x: Array) -> list[float]:
+        names, qd = self.velocities, x[self.nq :]
         try:
-            qd = x[self.nq :]
             if self.observed is not None:
                 qd = self.observed(np.concatenate([x, [t], np.zeros(len(qd))]))  # they do not depend on the forces
             with np.errstate(all="warn"):
-                given = self.controller.function(x[: self.nq].copy(), qd.copy(), t)
-            forces = real_array("the controller's forces", given)
-            if forces.shape != (len(self.velocities),):
-                needed = f"({len(self.velocities)},), one for each of {', '.join(self.velocities)}"
+                forces = real_array(
+                    "the controller's forces", self.controller.function(x[: self.nq].copy(), qd.copy(), t)
+                )
+            if forces.shape != (len(names),):
+                needed = f"({len(names)},), one for each of {', '.join(names)}"
                 raise ValueError(f"the controller's forces must have shape {needed}; got {forces.shape}")
-            if not np.isfinite(forces).all():
-                name = self.velocities[int(np.argmin(np.isfinite(forces)))]
+            if not (good := np.isfinite(forces)).all():
+                name = names[int(np.argmin(good))]
                 raise ValueError(f"the controller's forces must be finite, got {forces.tolist()}: that of {name!r}")
         except Exception as error:
             error.add_note(f"in the controller at t = {t:.6g} s")

@@ -1,35 +1,33 @@
-"""Outcome: one run made to its end, its rows, its statistics, and the advice of another method."""
+"""Outcome: one run made to its end, its rows, and its statistics."""
 
 from __future__ import annotations
 
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph._shared import Array, counted, real_number
+from cgraph._shared import Array, real_number
 
+from ..integrators import Problem
 from .estimates.error_estimate import RunEstimate
-from .run_options import SMALL_MEMORY, TABLES, RunOptions, room
+from .events.event import EventProgram
+from .events.event_log import Happening
+from .progress_bar import Progress
+from .run_options import SMALL_MEMORY, TABLES, Span, room
 from .stepper import Stepper
 from .steps.dense_output import StepBlock
-from .steps.row_values import converted
+from .steps.row_values import converted, row_values
+from .steps.state_sizes import OTHERS as SMALLEST_SHARE
 from .trajectory import Crossings, SimulationWarning, Stats, Trajectory
 
-if TYPE_CHECKING:
-    from .events.event import EventProgram
-    from .events.event_log import Happening
-
-IMPLICIT = ("radau", "rodas")
-OTHERS = ("radau", "dop853")  # of the rate the first takes no derivative by the time, and the second none at all
-TRIED = 1000  # trials of steps of a method, at most
-LONGER_STEPS = 4.0  # times as long as those of the run are steps that are worth a word
 REACHED = "reached t_end"
+LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it; of a velocity the same
+SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller
 INTERRUPTED = "interrupted"  # what the message of a run that Ctrl-C ended begins with
 
 
@@ -54,8 +52,7 @@ class MotionEnd(NamedTuple):
     t : float
         The end of the run, or the instant of the event that ended it [s].
     q, qd : ndarray
-        The state there, (nq,) and (n,) [rad or m, per second], or (N, nq) and (N, n); of an OdeSystem q is the state,
-        and qd empty.
+        The state there, (nq,) and (n,) [rad or m, per second], or (N, nq) and (N, n); of an OdeSystem q alone.
 
     Examples
     --------
@@ -80,8 +77,7 @@ class InterruptedMotion(KeyboardInterrupt):
 class MotionSteps:
     """A motion as it goes on, made by `Run.start`. One thread at a time may move it.
 
-    By `step` to its end it has the states of the trajectory's rows, to the bit. An instant of `propagate_until` cuts a
-    step, so that those that follow are others, within the same tolerance.
+    By `step` it has the states of the trajectory's rows, to the bit; an instant of `propagate_until` cuts a step.
 
     Attributes
     ----------
@@ -106,7 +102,7 @@ class MotionSteps:
 
     def __init__(self, run: Stepper, x: Array, t0: float, t_end: float | None) -> None:
         self._run, self._x, self._t_end = run, x, None if t_end is None else float(t_end)
-        self._begun, self._direction = False, 0.0
+        self._direction = 0.0  # before the first step
         run.begin(x, t0, t0 + 1.0 if t_end is None else t_end)
 
     @property
@@ -137,9 +133,7 @@ class MotionSteps:
         if self._t_end is None or self._t_end == self.t:
             where = "was started without one" if self._t_end is None else f"is there, at t = {self.t:g} s"
             raise ValueError(f"a step goes on to t_end, and the motion {where}: propagate_until(t) goes on to a time")
-        self._go(self._t_end)
-        self._run.step()
-        self._judge()
+        self._advance(self._t_end, single=True)
 
     def propagate_until(self, t: float) -> None:
         """Steps to an instant, the last of which ends there.
@@ -156,23 +150,18 @@ class MotionSteps:
         TypeError, ValueError
             For what is no time, or one that the motion has left behind.
         """
-        t = real_number("t", t)
-        if t == self.t:
-            return
-        self._go(t)
-        self._run.until(t)
-        self._judge()
+        if (t := real_number("t", t)) != self.t:
+            self._advance(t, single=False)
 
-    def _go(self, t: float) -> None:
+    def _advance(self, t: float, *, single: bool) -> None:
         if not math.isfinite(t):
             raise ValueError(f"t must be finite, got {t!r} s")
         if self._direction * (t - self.t) < 0.0:
             raise ValueError(f"the motion is at t = {self.t:g} s and does not go back to t = {t:g} s: start it anew")
-        if not self._begun:
+        if not self._direction:
             self._run.begin(self._x, self.t, t if self._t_end is None else self._t_end)
-            self._direction, self._begun = math.copysign(1.0, t - self.t), True
-
-    def _judge(self) -> None:
+            self._direction = math.copysign(1.0, t - self.t)
+        self._run.advance(t, single=single)
         for text in self._run.warnings:
             warnings.warn(text, SimulationWarning, stacklevel=3)
         self._run.warnings.clear()
@@ -181,36 +170,30 @@ class MotionSteps:
 
 
 class Recorder:
-    """The rows of a trajectory that starts with x at t0: every step, or the states at `times`.
+    """The rows of a trajectory that starts with x: every step, or the states at the times of a span."""
 
-    direction: 1.0, or -1.0 for a run back in time, whose times decrease.
-    """
-
-    def __init__(self, x: Array, times: Array | None, t0: float = 0.0, direction: float = 1.0) -> None:
-        self.times, self.direction = times, direction
-        self.last, self._last_state = t0, x  # how far the run has come [s]
-        at_start = int(times is None or times[0] == t0)
-        self._parts = [(np.array([t0])[:at_start], np.array([x])[:at_start])]  # times and states
-        self._next = at_start  # of `times`
+    def __init__(self, x: Array, span: Span) -> None:
+        self._times, self._direction = span.times, span.direction
+        self.last, self._last_state = span.t0, x  # how far the run has come [s]
+        at_start = self._next = int(span.times is None or span.times[0] == span.t0)  # of the times
+        self._parts = [(np.array([span.t0])[:at_start], np.array([x])[:at_start])]  # times and states
         self.size = 0  # bytes
 
     def add(self, block: StepBlock) -> None:
         """The rows of these steps."""
-        if not len(block.t):
-            return
-        last, following = float(block.t[-1]), self._next
-        if self.times is None:
+        if self._times is None:
             self._append(block.t, block.x)
         else:
-            following = int(np.searchsorted(self.direction * self.times, self.direction * last, side="right"))
-            times = self.times[self._next : following]
+            following = int(np.searchsorted(self._direction * self._times, self._direction * block.t[-1], side="right"))
+            times = self._times[self._next : following]
             self._append(times, block.at(times))
-        self._next, self.last, self._last_state = following, last, block.x[-1].copy()
+            self._next = following
+        self.last, self._last_state = float(block.t[-1]), block.x[-1].copy()
 
     def add_last(self) -> None:
         """Add the state at which a run stopped as its last row, also between the times of t_eval."""
         recorded = [times[-1] for times, _ in self._parts if len(times)]
-        if not recorded or self.direction * (self.last - recorded[-1]) > 0.0:
+        if not recorded or self._direction * (self.last - recorded[-1]) > 0.0:
             self._append(np.array([self.last]), self._last_state[None])
 
     def _append(self, times: Array, states: Array) -> None:
@@ -224,107 +207,36 @@ class Recorder:
 
 
 def outcome(
-    run: Stepper,
-    x: Array,
-    options: RunOptions,
-    again: Callable[[RunOptions], Stepper] | None = None,
-    steps: list[StepBlock] | None = None,
-    report: Callable[[float], None] | None = None,
+    run: Stepper, x: Array, span: Span, steps: list[StepBlock] | None = None, report: Progress | None = None
 ) -> tuple[Stats, Recorder]:
-    """How a run from x (m,) to t_end, an event, a failure or Ctrl-C goes, and its rows.
-
-    again: the same run by other options, see `advise`.  steps: receives all steps, with their dense output.
-    report: is told how far the run is [s]; the rows then may fill the memory.
-    """
-    recorder = Recorder(x, options.times, options.t0, options.direction)
-    begin, estimate = time.perf_counter(), RunEstimate(run, x, options)
-    error, at_end, end = None, None, None
-    doubts: tuple[str, ...] = ()
+    """How a run from x (m,) goes, and its rows; steps: receives all; report: is told how far it is [s]."""
+    recorder, estimate = Recorder(x, span), RunEstimate(run, x, span)
+    begin, kept, most = time.perf_counter(), 0, SMALL_MEMORY
+    found: tuple[float | None, float | None, tuple[str, ...]] = None, None, ()
     try:
         with np.errstate(all="ignore"):
-            for block in run.blocks(x) if report is None else _noted(run, x, recorder, options, steps, report):
-                recorder.add(block)
-                estimate.add(block)
+            for block in run.blocks(x, span):
+                made = block if steps is None else run.with_dense(block)
+                recorder.add(made)
+                estimate.add(made)
+                if steps is not None:
+                    steps.append(made)
+                    kept += made.nbytes
+                if report is None:
+                    continue
+                report(abs(recorder.last - span.t0))
+                most = room() / TABLES if recorder.size + kept > most == SMALL_MEMORY else most
+                if recorder.size + kept > most:
+                    run.status = f"stopped at t = {recorder.last:.6g} s: the rows fill the memory; t_eval records fewer"
+                    break
             if not run.status:
-                error, at_end, doubts = estimate.result()
-        end = time.perf_counter()
-        advise(run, recorder.last, options, x, again)
+                found = estimate.result()
     except KeyboardInterrupt:
         run.status = f"{INTERRUPTED} after t = {recorder.last:.6g} s"
-    seconds = (time.perf_counter() if end is None else end) - begin - estimate.seconds
-    stats = Stats(
-        options.method,
-        run.steps,
-        run.rejected,
-        run.evaluations,
-        run.largest,
-        seconds,
-        not run.status,
-        run.status or run.event or REACHED,
-        -1 if run.status else int(bool(run.event)),
-        run.jacobians,
-        run.factorizations,
-        error,
-        at_end,
-        (*run.warnings, *doubts),
-    )
-    return stats, recorder
-
-
-def _noted(
-    run: Stepper,
-    x: Array,
-    recorder: Recorder,
-    options: RunOptions,
-    steps: list[StepBlock] | None,
-    report: Callable[[float], None],
-) -> Iterator[StepBlock]:
-    """The blocks of a run, until rows and steps fill the memory."""
-    kept, most = 0, SMALL_MEMORY
-    for block in run.blocks(x):
-        if steps is not None:
-            steps.append(block if block.dense is not None else run.with_dense(block))
-            kept += steps[-1].nbytes
-        yield block if steps is None else steps[-1]
-        if recorder.size + kept > most:
-            most = room() / TABLES if most == SMALL_MEMORY else most
-            if recorder.size + kept > most:
-                last = f"{recorder.last:.6g} s"
-                run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
-                return
-        report(abs(float(block.t[-1]) - options.t0))
-
-
-def advise(
-    run: Stepper, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Stepper] | None
-) -> None:
-    """Name the method in the warning of a run that is stiff, or in the status of one that lacks a derivative.
-
-    None where all of them stop, or take steps as short, or come no farther.
-
-    reached: how far the run has come [s].  x: where it started, (m,).  again: the same run by other options;
-    None where a controller decides, which may remember what it has seen.
-    """
-    if not (run.stiff or run.slope) or again is None:
-        return
-    length = LONGER_STEPS * abs(reached - options.t0) / max(run.steps, 1)
-    for name in OTHERS if run.slope else IMPLICIT:
-        t = options.t0
-        try:
-            trial = again(replace(options, method=name, t_eval=None, max_steps=TRIED))
-            with np.errstate(all="ignore"):
-                for block in trial.blocks(x):
-                    t = float(block.t[-1]) if len(block.t) else t
-        except Exception:  # noqa: BLE001, S112 -- whatever another method lacks: the run that was asked for is done
-            continue
-        text = f"; try method={name!r}, which comes to t = {t:.6g} s in {counted(trial.steps, 'step')}"
-        if run.slope and not trial.status:
-            run.status += text
-            return
-        whole = trial.steps + trial.rejected < TRIED
-        if not run.slope and not (trial.status and whole) and abs(t - options.t0) >= length * trial.steps > 0.0:
-            run.warnings[run.warnings.index(run.stiff)] += text
-            return
+    counts = run.steps, run.rejected, run.evaluations, run.largest, time.perf_counter() - begin - estimate.seconds
+    ended = not run.status, run.status or run.event or REACHED, -1 if run.status else int(bool(run.event))
+    work, (error, at_end, doubts) = (run.jacobians, run.factorizations), found
+    return Stats(run.options.method, *counts, *ended, *work, error, at_end, (*run.warnings, *doubts)), recorder
 
 
 def split_crossings(
@@ -339,3 +251,26 @@ def split_crossings(
         states = converted(program.velocities, times, states, parameters)
         result[event.name] = Crossings(times, states[:, :nq], states[:, nq:])
     return result
+
+
+def unreached_momenta(
+    problem: Problem, times: Array, rows: Array, parameters: ArrayLike = 0.0, *, start: tuple[float, Array, Array]
+) -> list[str]:
+    """Doubts of rows (T, m) of a problem in momenta; start: the instant, q and qd, and the state (m,) they make."""
+    if problem.missing is None or not len(rows):
+        return []
+    said, instead, nq, (t, begin, x) = [], "take form='velocity'", problem.nq, start
+    # Of an L that is not convex several velocities have the same momenta
+    qd, back = begin[nq:], converted(problem.velocities, t, x, parameters)[nq:]
+    off = np.abs(back - qd) > LOOSE * np.maximum(np.abs(qd), SLOW * np.abs(qd).max(initial=0.0))
+    for k in np.flatnonzero(off)[:1] if qd.any() else ():
+        other = f"of the {problem.components[nq + k]} it is {back[k]:.6g} in place of {qd[k]:.6g}"
+        said.append(f"the momenta of the start belong to other velocities too: {other}; {instead}")
+    momenta, missing = rows[:, nq:], row_values(problem.missing, times, rows, parameters)
+    sizes = np.abs(momenta).max(axis=0, initial=0.0)
+    allowed = LOOSE * np.maximum(sizes, SMALLEST_SHARE * sizes.max(initial=0.0))
+    for row, k in np.argwhere(~(np.abs(missing) <= allowed))[:1]:
+        left = f"{missing[row, k]:.2g} of {momenta[row, k]:.2g}, {problem.components[nq + k]}"
+        text = f"at t = {times[row]:.6g} s the velocities do not have the momenta: the iteration leaves {left}"
+        said.append(f"{text}; {instead}")
+    return said

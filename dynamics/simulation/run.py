@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +21,7 @@ from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import initial_values, other_inputs, start_state
 from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
 from ..systems.arguments import parameter_value
-from ..systems.model import Equations, Model, as_equations
+from ..systems.model import Model, as_equations
 from .applied_force import Applied, Hold, Tau, with_applied
 from .events.event import Event, EventProgram, event_program
 from .outcome import (
@@ -34,92 +33,69 @@ from .outcome import (
     MotionSteps,
     outcome,
     split_crossings,
+    unreached_momenta,
 )
 from .progress_bar import Progress
-from .run_options import RunOptions
+from .run_options import TABLES, RunOptions, Span, Steps, require_room
 from .stepper import Stepper, stepper_of
 from .steps.dense_output import Solution, StepBlock
+from .steps.equal_steps import step_count
 from .steps.row_values import converted
 from .steps.step_program import step_program
 from .trajectory import SimulationWarning, Trajectory
-from .unreached_momenta import unreached_momenta
 
 if TYPE_CHECKING:
     from .ensembles.task import Workers
 
-KEPT_PARAMETERS = 16  # sets of parameter values, whose equations a run keeps
+Values: TypeAlias = Mapping[str, float] | None  # {name of a parameter: value}
+KEPT = 16  # runs with other parameters, and tasks, that a run keeps
 
 
+class RunEquations(NamedTuple):
+    """What a run moves by: equations and applied force, and as problems with numbers built in."""
+
+    applied: Applied
+    numbers: Mapping[str, float]  # of the inputs of the state equation besides states and t
+    problem: Problem  # in q and qd
+    stepped: Problem  # in the states that are stepped
+    watched: EventProgram | None
+
+
+@dataclass(eq=False, repr=False)
 class Run(HoldsNodes):
     """Motions of one model by one method, all but start, end and parameter values fixed; made by `prepare`.
 
-    A call gives the Trajectory that `simulate` gives, to the bit. Any number of threads may call a run at once: the
-    memory in which it moves is one for each thread.
+    A call gives the Trajectory that `simulate` gives, to the bit. Any number of threads may call a run at once.
 
     Examples
     --------
     >>> import dynamics as dyn
-    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
-    >>> run = dyn.prepare(arm, rtol=1e-12)
+    >>> run = dyn.prepare(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), rtol=1e-12)
     >>> run([1.0, 0.5], [0.0, 0.0], t_end=1.0, t_eval=[0.5, 1.0]).q.round(3).tolist()
     [[0.31, -0.04], [-0.989, 0.108]]
-    >>> t, q, qd = run.end([1.0, 0.5], [0.0, 0.0], t_end=1.0)
-    >>> q.round(3).tolist()
-    [-0.989, 0.108]
     """
 
-    def __init__(
-        self,
-        model: Model,
-        options: RunOptions,
-        tau: Tau,
-        events: Sequence[Event],
-        form: str,
-        dense_output: bool,
-        varied: tuple[str, ...],
-        parameters: Mapping[str, Any] | None = None,
-    ) -> None:
-        self._model, self._tau, self._events, self._parameters = model, tau, events, parameters
-        self._options, self._form, self._dense_output, self._varied = options, form, dense_output, varied
+    _model: Model
+    _options: Steps
+    _tau: Tau
+    _events: Sequence[Event]
+    _form: str
+    _dense_output: bool
+    _varied: tuple[str, ...]
+    _parameters: Values = None
 
     @cached_property
-    def applied(self) -> Applied:
-        """The equations of the model, and the force that is applied to it."""
-        return with_applied(self._model, self._tau, self._values)
-
-    @cached_property
-    def _values(self) -> Mapping[str, Any] | None:
-        """Values of parameters, those that stay open included, so that a controller knows its own."""
-        if not (self._varied and isinstance(self._parameters, Mapping | None)):
-            return self._parameters
-        own = as_equations(self._model).parameters
-        return {name: own.get(name, 0.0) for name in self._varied} | dict(self._parameters or {})
-
-    @property
-    def model(self) -> Equations:
-        """The equations of the model."""
-        return self.applied.model
-
-    @cached_property
-    def _numbers(self) -> Mapping[str, float]:
-        """Numbers of the inputs of the state equation besides states and t."""
-        return other_inputs(self.model, self.applied.constant, self._values)
-
-    @cached_property
-    def problem(self) -> Problem:
-        """The equations with numbers built in, in q and qd."""
-        stay = {*self._varied} if self.applied.controller is None else {*state_inputs(self.model).applied}
-        return derive(self.model, {name: value for name, value in self._numbers.items() if name not in stay})
-
-    @cached_property
-    def stepped(self) -> Problem:
-        """The equations in the states that are stepped."""
-        return in_form(self.problem, self._form)
-
-    @cached_property
-    def watched(self) -> EventProgram | None:
-        """The events to look for."""
-        return event_program(self.stepped, self._events) if self._events else None
+    def _equations(self) -> RunEquations:
+        own, values = as_equations(self._model).parameters, self._parameters
+        if self._varied:  # also those that stay open, so that a controller knows its own
+            values = {name: own.get(name, 0.0) for name in self._varied} | dict(values or {})
+        applied = with_applied(self._model, self._tau, values)
+        numbers = other_inputs(applied.model, applied.constant, values)
+        stay = {*self._varied} if applied.controller is None else {*state_inputs(applied.model).applied}
+        problem = derive(applied.model, {name: value for name, value in numbers.items() if name not in stay})
+        stepped = in_form(problem, self._form)
+        watched = event_program(stepped, self._events) if self._events else None
+        return RunEquations(applied, numbers, problem, stepped, watched)
 
     def __call__(
         self,
@@ -129,28 +105,21 @@ class Run(HoldsNodes):
         t0: float = 0.0,
         *,
         t_eval: ArrayLike | None = None,
-        parameters: Mapping[str, float] | None = None,
+        parameters: Values = None,
     ) -> Trajectory:
         """The motion from (q, qd) at t0 to t_end, to the bit that of `simulate`; arguments and errors as there.
 
         Ctrl-C is a KeyboardInterrupt, so that a loop of calls ends; `run` of it is the motion until then.
         """
-        return self._bound(parameters)._trajectory(q, qd, self._options.over(t0, t_end, t_eval), parameters)
+        return self._bound(parameters)._trajectory(q, qd, Span(t_end, t0=t0, t_eval=t_eval), parameters)
 
     def end(
-        self,
-        q: ArrayLike,
-        qd: ArrayLike | None,
-        t_end: float,
-        t0: float = 0.0,
-        parameters: Mapping[str, float] | None = None,
+        self, q: ArrayLike, qd: ArrayLike | None, t_end: float, t0: float = 0.0, parameters: Values = None
     ) -> MotionEnd:
         """The end of the motion from (q, qd) at t0, alone: the last row of the trajectory, to the bit.
 
-        It takes some microseconds besides the steps: a memory is kept, and the machine code entered once for a short
-        run. With events, a sampled controller, constraints, momenta, `max_steps`, or where the error of equal steps is
-        estimated, it takes as long as the trajectory, and warns of what that warns of; else it does not judge whether
-        another method would be faster.
+        It takes some microseconds besides the steps; with events, a sampled controller, constraints, momenta,
+        `max_steps`, or where the error of equal steps is estimated, as long as the trajectory, and warns as that does.
 
         Parameters
         ----------
@@ -177,7 +146,25 @@ class Run(HoldsNodes):
         >>> motion.end([1.0], None, t_end=1.0).q.round(6)
         array([0.367879])
         """
-        return self._bound(parameters)._end(q, qd, t_end, t0, parameters)
+        run = self if parameters is None else self._bound(parameters)
+        if (alone := run._memory) is None:
+            motion = run._trajectory(q, qd, Span(t_end, t0=t0, t_eval=[t_end]), parameters)
+            if not motion.success:
+                raise MotionError(f"the motion did not reach t_end, {motion.message}")
+            return MotionEnd(float(motion.t[-1]), motion.q[-1], motion.qd[-1])
+        if self._varied:
+            alone.set_parameters(run._open_values(parameters))
+        q, qd = floats(q), floats(qd)
+        plain = type(q) is np.ndarray and (qd is None or type(qd) is np.ndarray) and alone.program.normalization is None
+        plain = plain and type(t0) is type(t_end) is float and self._options.may_go(t0, t_end)
+        if not (plain and alone.has_begun(q, qd, t0, t_end)):  # see what is wrong
+            span = Span(t_end, t0=t0)
+            alone.begin(run._start(q, qd, span, alone.parameters), span.t0, span.t_end)
+            t_end = span.t_end
+        alone.advance(t_end)
+        if alone.status:
+            raise MotionError(f"the motion did not reach t_end, {alone.status}")
+        return MotionEnd(t_end, alone.q.copy(), alone.qd.copy())
 
     def ends(
         self,
@@ -190,8 +177,8 @@ class Run(HoldsNodes):
     ) -> MotionEnd:
         """The ends of motions from N starts at t0, side by side: the last rows of `simulate_many`, to the bit.
 
-        All that is not a step is done once, in the first call: what follows, as in a loop of control, pays the steps.
-        A motion that stops before its end is NaN, and a `SimulationWarning` says of how many and why.
+        What is not a step is done in the first call. A motion that stops before its end is NaN, and a
+        `SimulationWarning` says of how many and why.
 
         Parameters
         ----------
@@ -225,31 +212,36 @@ class Run(HoldsNodes):
 
         if self._events:
             raise ValueError("ends of many motions are of those without events: simulate_many looks for them")
-        run = self._bound(None if parameters is None else _single_values(parameters, self._varied))
-        if run.applied.controller is not None:
+        values = parameters if isinstance(parameters, Mapping) else {}
+        if several := [name for name, value in values.items() if np.ndim(value) and name not in self._varied]:
+            what = f"parameter {several[0]!r} has a value for each motion, and the motion was prepared with one for all"
+            raise ValueError(f"{what}: prepare(.., varied=[{several[0]!r}]) keeps it open")
+        run = self._bound(parameters)
+        applied, _, _, problem, _ = run._equations
+        if applied.controller is not None:
             one = "a SampledController may remember what it has seen, and so controls one motion"
             raise TypeError(f"{one}: ends of many are without")
         run._require_given(parameters)
-        options, problem = self._options.over(t0, t_end, [t_end]), run.stepped
-        start = initial_values(run.model, q, qd, run.applied.constant, parameters, options.t0)
+        span = Span(t_end, t0=t0, t_eval=[t_end])
+        start = initial_values(applied.model, q, qd, applied.constant, parameters, span.t0)
         p = np.empty((len(start.x), len(problem.parameters)))
         for k, name in enumerate(problem.parameters):
             p[:, k] = start.varied[name] if name in start.varied else start.bound[name]
-        key = len(p), options.t0, options.t_end
-        if run._last[0] != key:  # what is done once for calls that are alike
-            options.check(run.problem.states)
-            run._last = key, Task(step_program(problem, options.integrator, dense=False), options, len(p))
-        x = ends_of(run._last[1], converted(problem.momentum, options.t0, start.x, p), p, workers)
-        states = converted(problem.velocities, options.t_end, x, p)
-        return MotionEnd(options.t_end, states[:, : problem.nq], states[:, problem.nq :])
+
+        def task() -> Task:
+            parts = [(part, each.name) for part in (span, self._options) for each in fields(part) if each.init]
+            options = RunOptions(**{name: getattr(part, name) for part, name in parts})
+            options.check(span, run._equations.problem.states)
+            return Task(step_program(problem, options.integrator, dense=False), options, len(p))
+
+        x = ends_of(
+            run._made((len(p), span.t0, span.t_end), task), converted(problem.momentum, span.t0, start.x, p), p, workers
+        )
+        states = converted(problem.velocities, span.t_end, x, p)
+        return MotionEnd(span.t_end, states[:, : problem.nq], states[:, problem.nq :])
 
     def start(
-        self,
-        q: ArrayLike,
-        qd: ArrayLike | None,
-        t_end: float | None = None,
-        t0: float = 0.0,
-        parameters: Mapping[str, float] | None = None,
+        self, q: ArrayLike, qd: ArrayLike | None, t_end: float | None = None, t0: float = 0.0, parameters: Values = None
     ) -> MotionSteps:
         """The motion from (q, qd) at t0 as it goes on, step by step or from one instant to the next.
 
@@ -258,8 +250,7 @@ class Run(HoldsNodes):
         q, qd, t0, parameters
             As of `simulate`.
         t_end : float, optional
-            Where `step` goes to, and by which the first step is chosen [s]; without it the first instant that
-            `propagate_until` is asked for.
+            Where `step` goes to, and by which the first step is chosen [s]; by default the first instant propagated to.
 
         Returns
         -------
@@ -274,30 +265,22 @@ class Run(HoldsNodes):
         Examples
         --------
         >>> import dynamics as dyn
-        >>> motion = dyn.prepare(dyn.planar_arm([1.0], [1.0]), rtol=1e-10)
-        >>> going = motion.start([0.1], [0.0])
-        >>> for k in range(3):
-        ...     going.propagate_until(0.5 * (k + 1))
-        ...     print(going.t, going.q.round(3), going.qd.round(3))
-        0.5 [-0.034] [-0.361]
-        1.0 [-0.077] [0.245]
-        1.5 [0.086] [0.195]
+        >>> going = dyn.prepare(dyn.planar_arm([1.0], [1.0]), rtol=1e-10).start([0.1], [0.0])
+        >>> going.propagate_until(0.5)
+        >>> going.t, going.q.round(3), going.qd.round(3)
+        (0.5, array([-0.034]), array([-0.361]))
         """
-        bound = self._bound(parameters)
-        if not bound._is_of_steps_alone:
-            raise ValueError(
-                "single steps are of motions without events, sampled controllers and max_steps, in "
-                'form="velocity": call the motion, which gives its rows'
-            )
-        x = bound._checked_start(q, qd, t0, t0 + 1.0 if t_end is None else t_end, parameters)
-        stepper = bound._unrecorded()
-        stepper.set_parameters(bound._open_values(parameters))
-        return MotionSteps(stepper, x, float(t0), t_end)
+        run = self._bound(parameters)
+        if not run._is_of_steps_alone:
+            raise ValueError("single steps are of motions without events, sampled controllers, momenta and max_steps")
+        p, span = run._open_values(parameters), Span(t0 + 1.0 if t_end is None else t_end, t0=t0)
+        x = run._start(q, qd, span, p)
+        return MotionSteps(stepper_of(run._equations.stepped, run._options, p, dense=False), x, span.t0, t_end)
 
     def compile(self) -> None:
         """Make the machine code of an end, and of rows at steps, with the model's own values of parameters."""
         if self._memory is None:
-            self._stepper(self._options, [0.0] * len(self.problem.parameters), self._hold(self._options))
+            self._stepper([0.0] * len(self._equations.problem.parameters))
 
     def _open_values(self, parameters: Mapping[str, Any] | None) -> list[float]:
         """Values of the inputs of the problem that are not built in, with these of parameters."""
@@ -305,10 +288,10 @@ class Run(HoldsNodes):
             return []
         given = parameters or {}
         self._require_given(given)
-        values = dict(self._numbers) | {name: parameter_value(name, value) for name, value in given.items()}
-        if given and self.model.system is not None:
-            self.model.system.require_values(values)
-        return [values[name] for name in self.problem.parameters]
+        values = dict(self._equations.numbers) | {name: parameter_value(name, each) for name, each in given.items()}
+        if given and (system := self._equations.applied.model.system) is not None:
+            system.require_values(values)
+        return [values[name] for name in self._equations.problem.parameters]
 
     def _require_given(self, parameters: Mapping[str, Any] | None) -> None:
         """Raises ValueError where a parameter of the controller has no value."""
@@ -317,166 +300,118 @@ class Run(HoldsNodes):
             raise ValueError(f"parameter {missing[0]!r} of the controller needs a value")
 
     @cached_property
-    def _last(self) -> tuple[Any, Any]:
-        """The task of the last call of `ends`, and what it was for."""
-        return None, None
-
-    @cached_property
-    def _runs(self) -> dict[Any, Run]:
-        """Runs with other parameters built in, by their values."""
+    def _kept(self) -> dict[Any, Any]:
+        """Runs with other parameters built in, by their values, and tasks of `ends`, by what they are for."""
         return {}
+
+    def _made(self, key: Any, make: Callable[[], Any]) -> Any:
+        """What is kept for a key."""
+        if (found := self._kept.get(key)) is None:
+            if len(self._kept) >= KEPT:
+                self._kept.pop(next(iter(self._kept)), None)
+            found = self._kept[key] = make()
+        return found
 
     def _bound(self, parameters: Mapping[str, Any] | None) -> Run:
         """The run with these values of parameters built in, but for those that stay open."""
-        if self._varied and isinstance(parameters, Mapping):
-            parameters = {name: value for name, value in parameters.items() if name not in self._varied}
-        if parameters is None or (isinstance(parameters, Mapping) and not parameters):
+        if parameters is None:
             return self
-        key = _values_key(parameters)
-        if (found := self._runs.get(key)) is None:
-            kept = self._model, self._options, self._tau, self._events, self._form, self._dense_output, self._varied
-            found = Run(*kept, parameters)
-            if len(self._runs) >= KEPT_PARAMETERS:
-                self._runs.pop(next(iter(self._runs)), None)
-            self._runs[key] = found
+        if not isinstance(parameters, Mapping):
+            raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
+        values = {name: parameter_value(name, each) for name, each in parameters.items() if name not in self._varied}
+        key = tuple([(name, value.hex()) for name, value in values.items()])  # which tells 0.0 and -0.0 apart
+        found: Run = self._made(key, partial(replace, self, _parameters=values)) if values else self
         return found
-
-    @cached_property
-    def _is_plain(self) -> bool:
-        """Whether any finite q and qd of the right shapes are a start as they are."""
-        return self.problem.normalization is None and self.problem.projection is None
 
     @property
     def _is_of_steps_alone(self) -> bool:
         """Whether nothing is done between the steps."""
-        watched = self._events or self.applied.controller is not None
-        return not (watched or self.stepped.momenta or self._options.max_steps < math.inf)
+        applied, _, _, stepped, watched = self._equations
+        return not (watched or applied.controller or stepped.momenta or self._options.max_steps < math.inf)
 
     @cached_property
     def _memories(self) -> threading.local:
         """The memory of each thread, in which its motions run one after another."""
         return threading.local()
 
-    def _unrecorded(self) -> Stepper:
-        """A memory in which motions run by steps alone."""
-        return stepper_of(self.stepped, self._options, [0.0] * len(self.problem.parameters), events=None, between=False)
-
     @property
     def _memory(self) -> Stepper | None:
         """The memory of this thread; None where an end needs more than steps."""
-        try:
-            found: Stepper | None = self._memories.made
-        except AttributeError:
-            options, steps = self._options, self._is_of_steps_alone
-            rounded = options.adaptive and steps and options.relative < options.integrator.finest
-            plain = steps and not options.estimated and not rounded and self.problem.projection is None
-            found = self._memories.made = self._unrecorded() if plain else None
+        found: Stepper | Run | None = getattr(self._memories, "made", self)
+        if isinstance(found, Run):  # not yet
+            options, problem = self._options, self._equations.problem
+            rounded = options.adaptive and options.relative < options.integrator.finest
+            more = options.estimated or rounded or problem.projection is not None or not self._is_of_steps_alone
+            zeros = [0.0] * len(problem.parameters)
+            found = None if more else stepper_of(self._equations.stepped, options, zeros, dense=False)
+            self._memories.made = found
         return found
 
-    def _end(
-        self,
-        q: ArrayLike,
-        qd: ArrayLike | None,
-        t_end: float,
-        t0: float,
-        parameters: Mapping[str, float] | None,
-    ) -> MotionEnd:
-        """As `end`, with parameters built in."""
-        alone = self._memory
-        if alone is None:
-            run = self._trajectory(q, qd, self._options.over(t0, t_end, [t_end]), parameters)
-            if not run.success:
-                raise MotionError(f"the motion did not reach t_end, {run.message}")
-            return MotionEnd(float(run.t[-1]), run.q[-1], run.qd[-1])
-        timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
-        if self._varied:
-            alone.set_parameters(self._open_values(parameters))
-        q, qd = floats(q), floats(qd)
-        plain = timely and self._is_plain and type(q) is np.ndarray and (qd is None or type(qd) is np.ndarray)
-        if not (plain and alone.has_begun(q, qd, t0, t_end)):  # see what is wrong
-            alone.begin(self._checked_start(q, qd, t0, t_end, parameters), float(t0), float(t_end))
-        alone.to_end()
-        if alone.status:
-            raise MotionError(f"the motion did not reach t_end, {alone.status}")
-        return MotionEnd(float(t_end), alone.q.copy(), alone.qd.copy())
+    def _start(self, q: ArrayLike, qd: ArrayLike | None, span: Span, p: Sequence[float]) -> Array:
+        """The state (m,) of q and qd in which a motion over a span starts, all checked."""
+        problem = self._equations.problem
+        self._options.check(span, problem.states)
+        numbers = dict(self._equations.numbers) | dict(zip(problem.parameters, p, strict=False))
+        return start_state(self._equations.applied.model, q, qd, numbers, span.t0)
 
-    def _start(self, q: ArrayLike, qd: ArrayLike | None, t0: float, p: Sequence[float]) -> Array:
-        """The state (m,) of q and qd in which a motion starts."""
-        numbers = dict(self._numbers) | dict(zip(self.problem.parameters, p, strict=False))
-        return start_state(self.model, q, qd, numbers, t0)
+    def _stepper(self, p: Sequence[float], hold: Hold | None = None, *, rows: bool = False) -> Stepper:
+        """The stepper of recorded runs; rows: between the ends of chosen steps."""
+        _, _, _, stepped, events = self._equations
+        dense = self._dense_output or bool(events) or (rows and self._options.adaptive)
+        return stepper_of(stepped, self._options, p, dense=dense, control=hold, events=events)
 
-    def _checked_start(
-        self, q: ArrayLike, qd: ArrayLike | None, t0: float, t_end: float, parameters: Mapping[str, Any] | None
-    ) -> Array:
-        """The state (m,) in which a motion starts, all arguments checked."""
-        self._options.over(t0, t_end, None).check(self.problem.states)
-        return self._start(q, qd, t0, self._open_values(parameters))
-
-    def _hold(self, options: RunOptions) -> Hold | None:
-        """The forces that a sampled controller is to hold. Raises ValueError for a motion that it cannot control."""
-        controller, velocities = self.applied.controller, self.stepped.velocities
-        if controller is None:
-            return None
-        if options.direction < 0.0:
-            raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
-        observed = None if velocities is None else _compiled(velocities, options.backend)
-        return Hold(controller, self.model.velocities, self.stepped.nq, options.t0, observed)
-
-    def _stepper(self, options: RunOptions, p: Sequence[float], hold: Hold | None = None) -> Stepper:
-        return stepper_of(
-            self.stepped, options, p, hold, events=self.watched, between=bool(self._events) or self._dense_output
-        )
-
-    def _trajectory(
-        self, q: ArrayLike, qd: ArrayLike | None, options: RunOptions, parameters: Mapping[str, float] | None
-    ) -> Trajectory:
-        """The motion over the span of options, with parameters built in. Raises InterruptedMotion by Ctrl-C."""
-        p, stepped = self._open_values(parameters), self.stepped
-        start, values = self._start(q, qd, options.t0, p), p or 0.0
-        options.check(self.problem.states)
-        options.check_room(len(start))
+    def _trajectory(self, q: ArrayLike, qd: ArrayLike | None, span: Span, parameters: Values) -> Trajectory:
+        """The motion over the span, with parameters built in. Raises InterruptedMotion by Ctrl-C."""
+        (applied, _, problem, stepped, _), p = self._equations, self._open_values(parameters)
+        start, values = self._start(q, qd, span, p), p or 0.0
+        if not self._options.adaptive and span.times is None:
+            count, m = step_count(span.length, self._options.step), len(start)
+            require_room(8 * TABLES * count * m, f"{count} steps of {m} numbers", "record fewer times (t_eval)")
 
         # Write the steps of the method over the equations, and compile them; the states are (q, qd), or here (q, p)
-        hold = self._hold(options)
-        run, x = self._stepper(options, p, hold), converted(stepped.momentum, options.t0, start, values)
+        hold = None
+        if applied.controller is not None:
+            if span.direction < 0.0:
+                raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
+            observed = None if stepped.velocities is None else _compiled(stepped.velocities, self._options.backend)
+            hold = Hold(applied.controller, applied.model.velocities, stepped.nq, span.t0, observed)
+        run = self._stepper(p, hold, rows=span.between)
+        x = converted(stepped.momentum, span.t0, start, values)
 
         # Integrate, noting rows and events
         steps: list[StepBlock] | None = [] if self._dense_output else None
-        again = partial(self._stepper, p=p) if hold is None else None
-        with Progress("simulate", options.length, options.progress) as report:
-            stats, recorder = outcome(run, x, options, again, steps, report)
+        with Progress("simulate", span.length, self._options.progress) as report:
+            stats, recorder = outcome(run, x, span, steps, report)
         if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
             recorder.add_last()
         times, rows = recorder.table()
 
         # Put the result together
-        if missed := unreached_momenta(stepped, times, rows, values, start=(options.t0, start, x)):
+        if missed := unreached_momenta(stepped, times, rows, values, start=(span.t0, start, x)):
             stats = replace(stats, warnings=(*stats.warnings, *missed))
-        early = not stats.success and not stats.message.startswith(INTERRUPTED)
-        for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:
-            warnings.warn(text, SimulationWarning, stacklevel=_level_of_caller())
+        interrupted = stats.message.startswith(INTERRUPTED)
+        early = [] if stats.success or interrupted else [f"the run {stats.message}"]
+        for text in [*early, *stats.warnings]:
+            warnings.warn(text, SimulationWarning, stacklevel=3)
         nq, states = stepped.nq, converted(stepped.velocities, times, rows, values)
-        bound = dict(zip(self.problem.parameters, p, strict=False))
+        bound, velocities = dict(zip(problem.parameters, p, strict=False)), stepped.velocities
+        velocities = None if velocities is None else _specialized(velocities, bound)
         done = Trajectory(
             times,
             states[:, :nq],
             states[:, nq:],
             stats,
             {} if run.log is None else split_crossings(run.log.program, run.log.happened, nq, values),
-            RunGraphs(self.problem, self.applied, bound) if bound else self._graphs,
-            None if steps is None else Solution(options.t0, x, steps, nq, _specialized(stepped.velocities, bound)),
+            RunGraphs(problem, applied, bound),
+            None if steps is None else Solution(span.t0, x, steps, nq, velocities),
             None if hold is None else hold.held,
-            self.model.coordinates,
-            self.model.velocities,
+            applied.model.coordinates,
+            applied.model.velocities,
             rows[:, nq:] if stepped.momenta else None,
         )
-        if stats.message.startswith(INTERRUPTED):
+        if interrupted:
             raise InterruptedMotion(done)
         return done
-
-    @cached_property
-    def _graphs(self) -> RunGraphs:
-        return RunGraphs(self.problem, self.applied, {})
 
 
 class RunGraphs(Mapping[str, Graph]):
@@ -484,7 +419,7 @@ class RunGraphs(Mapping[str, Graph]):
 
     def __init__(self, problem: Problem, applied: Applied, bound: Mapping[str, float]) -> None:
         self._made, self._bound = dict[str, Graph](), bound
-        self._makers: dict[str, Callable[[], Graph | None]] = {"rate": lambda: problem.rate}
+        self._makers: dict[str, Callable[[], Any]] = {"rate": lambda: problem.rate}
         if problem.system is not None:
             tau = {f"tau{k}": node for k, node in enumerate(applied.nodes or ())}
             self._makers |= {
@@ -497,9 +432,7 @@ class RunGraphs(Mapping[str, Graph]):
 
     def __getitem__(self, name: str) -> Graph:
         if name not in self._made:
-            graph = _specialized(self._makers[name](), self._bound)
-            assert graph is not None
-            self._made[name] = graph
+            self._made[name] = _specialized(self._makers[name](), self._bound)
         return self._made[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -512,41 +445,13 @@ class RunGraphs(Mapping[str, Graph]):
         return dict, (dict(self),)
 
 
-def _specialized(graph: Graph | None, bound: Mapping[str, float]) -> Graph | None:
+def _specialized(graph: Graph, bound: Mapping[str, float]) -> Graph:
     """The graph with those of its inputs built in that have a value."""
-    known = {} if graph is None else {name: value for name, value in bound.items() if name in graph.input_names}
-    return cg.specialize(graph, known) if graph is not None and known else graph
+    known = {name: value for name, value in bound.items() if name in graph.input_names}
+    return cg.specialize(graph, known) if known else graph
 
 
 @kept_by_first
 def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
     """The velocities of momenta, for a controller."""
     return cg.compile(velocities, backend)
-
-
-def _single_values(parameters: Mapping[str, Any], varied: Sequence[str]) -> dict[str, Any]:
-    """The parameters that are the same for all motions. Raises ValueError for another that has many values."""
-    if not isinstance(parameters, Mapping):
-        raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
-    if several := [name for name, value in parameters.items() if np.ndim(value) and name not in varied]:
-        raise ValueError(
-            f"parameter {several[0]!r} has a value for each motion, and the motion was prepared with one for all: "
-            f"prepare(.., varied=[{several[0]!r}]) keeps it open"
-        )
-    return {name: value for name, value in parameters.items() if not np.ndim(value)}
-
-
-def _values_key(parameters: Mapping[str, Any]) -> Any:
-    """Key that tells parameter values apart, 0.0 and -0.0 too; a key of its own for what are none."""
-    try:
-        return tuple([(name, type(value), float(value).hex()) for name, value in parameters.items()])
-    except (TypeError, ValueError, OverflowError, AttributeError):
-        return object()
-
-
-def _level_of_caller() -> int:
-    """Level of the stack, above who asks, from which these files were called."""
-    level, frame = 1, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals["__name__"].startswith("dynamics.simulation."):
-        level, frame = level + 1, frame.f_back
-    return level

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from typing import Unpack
+from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from cgraph._shared import require_choice, require_flag, require_sequence
+from cgraph._shared import or_nearest, require_choice, require_flag, require_sequence
 
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
 from ..systems.model import Model, as_equations
-from .applied_force import SampledController, Tau, check_varied
+from .applied_force import SampledController, Tau
 from .events.event import Event, as_events
 from .outcome import InterruptedMotion
 from .run import Run
-from .run_options import METHOD, Options, RunOptions, time_span
+from .run_options import METHOD, Options, Span, Steps, known_options, time_span
 from .trajectory import Trajectory
 
 
@@ -36,42 +36,35 @@ def simulate(
 ) -> Trajectory:
     """The motion of a system from (q, qd) at t0 to t_end.
 
-    It is `prepare` and a call: what moves a model again and again prepares it once.
-
-    A step whose state is not finite, or that has to be smaller than the resolution of t, ends the run: the trajectory
-    keeps what was computed before it, the state where it stopped is its last row, and `stats.message` and a
-    `SimulationWarning` name the time and the coordinate. Ctrl-C does the same, without a warning.
+    It is `prepare` and a call. A step whose state is not finite, or that has to be smaller than the resolution of t,
+    ends the run: the state where it stopped is the last row, and `stats.message` and a `SimulationWarning` name the
+    time and the coordinate. Ctrl-C does the same, without a warning.
 
     Parameters
     ----------
     model : System, OdeSystem, Mechanism or Scene
         What moves.
     q, qd : array_like
-        The start, (nq,) and (n,) [rad or m, per second]; of an OdeSystem q is the state, (m,), and qd None. There are
-        as many coordinates as velocities but with ball and free joints, whose quaternions (w, x, y, z) are brought to
-        length 1: only their direction counts.
+        The start, (nq,) and (n,) [rad or m, per second]; of an OdeSystem q is the state, (m,), and qd None. Of the
+        quaternions (w, x, y, z) of ball and free joints the direction counts.
     t_end : float
         Where the run ends [s], before t0 for a run back in time.
     method : str
         A name of `dyn.METHODS`. Steps chosen by error: "dop853", "dopri5", and for stiff systems "rodas", "radau";
-        equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With ball and free joints and
-        constraints the symplectic ones step the state, which keeps what is quadratic in it, as a free rotor's energy;
-        "verlet" and "symplectic_euler" cannot.
+        equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... "verlet" and
+        "symplectic_euler" cannot be with ball and free joints and constraints.
     t_eval : array_like, optional
-        Times from the start, t = 0 or option t0, to t_end to record, in this order, (T,) [s]; by default every step.
-        Chosen steps are not changed by it.
+        Times from the start to t_end to record, (T,) [s]; by default every step. Chosen steps are not changed by it.
     events : Event or iterable of Event
         Instants to look for on the way.
     tau : float, sequence, callable or SampledController
         Applied force [N m or N]: constant, for all velocities or for each, (n,); or a controller. One in closed form is
         a function (q, qd, t) or (q, qd, t, p) to a node or number for each velocity, which is compiled into the steps,
-        see `with_controller`. A `SampledController` calls a Python function of numbers once in a period; equal steps
-        then have their error estimated by steps of half the length, period by period.
+        see `with_controller`. A `SampledController` calls a Python function of numbers once in a period.
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those that a controller in closed form has besides.
     **options
-        `t0`, `t_span`, `dt`, `max_step`, `rtol`, `atol`, `first_step`, `max_steps`, `estimate_error`, `dense_output`,
-        `form`, `backend`, `fma` and `progress`: see `dyn.Options`.
+        `t0`, `t_span`, `dt`, `rtol`, `atol`, `dense_output` and more: see `dyn.Options`.
 
     Returns
     -------
@@ -96,9 +89,9 @@ def simulate(
     [[1.0, 0.5], [0.31, -0.04], [-0.989, 0.108]]
     """
     t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
-    run = _run(model, method, tau, events, options)
+    run = _run(model, method, tau, events, options)._bound(parameters)
     try:
-        return run(q, qd, t_end, t0, t_eval=t_eval, parameters=parameters)
+        return run._trajectory(q, qd, Span(t_end, t0=t0, t_eval=t_eval), parameters)
     except InterruptedMotion as stop:
         return stop.run
 
@@ -119,19 +112,17 @@ def prepare(
     model, method, events, tau
         As of `simulate`, which is this and a call.
     varied : str or iterable of str
-        Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
-        of others are built into the machine code, as `simulate` does, and other ones compile anew. Not with a
-        SampledController. With a controller that is a function the first call checks the names.
+        Parameters of the model or of a controller whose values stay open. Values of others are built into the machine
+        code, and other ones compile anew. Not with a SampledController.
     **options
         See `dyn.Options`; `t0` and `t_span` belong to a call.
 
     Returns
     -------
     Run
-        `motion(q, qd, t_end)` gives the trajectory of `simulate`, `motion.end(q, qd, t_end)` its end alone, at the
-        price of its steps and some microseconds, and `motion.start(q, qd)` the motion step by step. Its machine code is
-        made here; rows between steps (`t_eval`) and other values of parameters that are not `varied` compile at the
-        first call with them.
+        `motion(q, qd, t_end)` gives the trajectory of `simulate`, `motion.end(q, qd, t_end)` its end alone, and
+        `motion.start(q, qd)` the motion step by step. Its machine code is made here; rows between steps (`t_eval`) and
+        other values of parameters that are not `varied` compile at the first call with them.
 
     Raises
     ------
@@ -152,20 +143,21 @@ def prepare(
     return run
 
 
-def _run(
-    model: Model,
-    method: str,
-    tau: Tau,
-    events: Event | Iterable[Event],
-    options: Options,
-    varied: str | Iterable[str] = (),
-) -> Run:
+def _run(model: Model, method: str, tau: Tau, events: Any, options: Mapping[str, Any], varied: Any = ()) -> Run:
     """A run of any span, its arguments checked, not compiled."""
-    form, dense = options.pop("form", FORMS[0]), require_flag("dense_output", options.pop("dense_output", False))
+    plain = {name: value for name, value in options.items() if name not in ("form", "dense_output")}
+    form, dense = options.get("form", FORMS[0]), require_flag("dense_output", options.get("dense_output", False))
     equations = as_equations(model)
     require_choice("form", form, FORMS)
-    if not (callable(tau) or isinstance(tau, float | SampledController)):
-        other_inputs(equations, tau)
     names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
-    check_varied(equations, tau, names)
-    return Run(model, RunOptions.of(method, options), tau, as_events(events), form, dense, names)
+    steps, sampled = Steps(method, **known_options(plain)), isinstance(tau, SampledController)
+    if names and sampled:
+        raise ValueError(f"varied = {names} cannot be with a SampledController, which holds its forces")
+    if unknown := [name for name in names if name not in equations.parameters and not callable(tau)]:
+        known = or_nearest(unknown[0], list(equations.parameters))
+        raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
+    if steps.estimate_error and sampled:
+        raise ValueError("estimate_error cannot be with a SampledController: run again with half of dt and compare")
+    if not (callable(tau) or sampled):
+        other_inputs(equations, tau)
+    return Run(model, steps, tau, as_events(events), form, dense, names)

@@ -7,7 +7,8 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,11 +19,6 @@ from cgraph._shared import Array, counted, or_nearest
 from .applied_force import HeldForces
 from .steps.dense_output import Solution
 from .steps.row_values import origin, row_values
-
-if TYPE_CHECKING:
-    from cgraph._shared import WhyNan
-
-_ROWS = 10_000  # of a text, written at once
 
 
 class SimulationWarning(UserWarning):
@@ -64,12 +60,11 @@ class Stats:
         Evaluations of the Jacobian and LU factorizations, 0 of methods without.
     error, error_at_end : float, optional
         Of equal steps, the estimated error of the state, phase included, the largest over the run, and that at the end,
-        in units of the largest value of a component over the run, of the component where it is largest. It is the
-        difference from a run of steps twice as long over 2^k - 1, where one of steps four times as long tells the order
-        k, at most the method's; where it is large, the difference itself. Runs are compared at up to a thousand
-        instants. Infinite where it is unknown, as where the rate has a jump or a kink on the way, which a warning
-        explains. None of chosen steps, of runs without `estimate_error`, with a SampledController or events that reset
-        the state, and of those that fail or end in the first steps.
+        of the component where it is largest over its largest value. It is the difference from a run of steps twice as
+        long over 2^k - 1, where one of steps four times as long tells the order k; where it is large, the difference
+        itself. Infinite where it is unknown, as where the rate has a jump or a kink on the way, which a warning
+        explains. None of chosen steps, without `estimate_error`, with a SampledController or events that reset the
+        state, and of runs that fail or end in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 
@@ -105,8 +100,7 @@ class Crossings(NamedTuple):
     t : ndarray
         The instants, (k,) [s].
     q, qd : ndarray
-        The states there, (k, nq) and (k, n) [rad or m, per second]; of an OdeSystem q holds them, and qd has no
-        columns.
+        The states there, (k, nq) and (k, n) [rad or m, per second]; of an OdeSystem q holds them.
 
     Examples
     --------
@@ -131,17 +125,14 @@ class Trajectory:
     t : ndarray
         Times, (T,) [s].
     q, qd : ndarray
-        Coordinates, (T, nq), and velocities, (T, n) [rad or m, per second]; quaternions have length 1. Of an OdeSystem
-        q holds the states, (T, m), and qd has no columns.
+        Coordinates, (T, nq), and velocities, (T, n) [rad or m, per second]; of an OdeSystem q holds the states, (T, m).
     stats : Stats
-        How the run went; its `success`, `status`, `message`, `nfev`, `njev` and `nlu` are attributes of the trajectory
-        too, as in SciPy.
+        How the run went; `success`, `status`, `message`, `nfev`, `njev` and `nlu` are attributes, too, as in SciPy.
     events : mapping
         {name of an event: Crossings}.
     graphs : mapping
-        {"rate": xdot, "force": tau + forces - damping qd, "energy": E}: graphs over the states and t, with the numbers
-        of the run built in, by which `qdd`, `forces` and `energy` are computed, "tau", and, with constraints,
-        "multipliers". An OdeSystem has the rate alone. With a SampledController, tau0, .. are inputs too.
+        {"rate": xdot, "force": tau + forces - damping qd, "energy": E}, "tau" and "multipliers": graphs over the states
+        and t, and forces of a SampledController, with the numbers of the run built in. An OdeSystem has the rate alone.
     dense : Solution, optional
         The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
     held : HeldForces, optional
@@ -187,8 +178,8 @@ class Trajectory:
         """
         if not isinstance(name, str):
             raise TypeError(f"a column of a trajectory has a name, got {type(name).__name__}: {name!r:.60}")
-        known = {"q": self.coordinates} | dict.fromkeys(("qd", "qdd", "tau", "forces"), self.velocities)
-        known |= {} if self.p is None else {"p": self.velocities}
+        kinds = ("qd", "qdd", "tau", "forces") if self.p is None else ("qd", "qdd", "tau", "forces", "p")
+        known = {"q": self.coordinates} | dict.fromkeys(kinds, self.velocities)
         places = {f"{kind}.{each}": (kind, i) for kind, names in known.items() for i, each in enumerate(names)}
         by_number = {f"{kind}{i}": (kind, i) for kind, names in known.items() for i in range(len(names))}
         states = {} if self.velocities else {each: ("q", i) for i, each in enumerate(self.coordinates)}
@@ -200,8 +191,7 @@ class Trajectory:
     def solution(self, t: ArrayLike) -> tuple[Array, Array]:
         """The motion at any time of the run, by the dense output of its steps.
 
-        At the end of a step it is that step's state exactly; between, it has the order of the method's own dense
-        output; of equal steps that of the method, or of a cubic.
+        At the ends of steps it is their states exactly; between, it has the order of the method's own dense output.
 
         Parameters
         ----------
@@ -236,8 +226,8 @@ class Trajectory:
         Returns
         -------
         str
-            A line of names, as "t", "q.elbow", "qd.elbow", "energy", and "tau.elbow" where a run has applied forces (of
-            an OdeSystem "t" and its states), and a line for each row.
+            A line of names, as "t", "q.elbow", "qd.elbow", "energy", and "tau.elbow" of applied forces (of an OdeSystem
+            "t" and its states), and a line for each row.
 
         Examples
         --------
@@ -248,9 +238,12 @@ class Trajectory:
         """
         names, columns = ["t"], [self.t[:, np.newaxis], self.q]
         if self.velocities:
-            names += [f"q.{name}" for name in self.coordinates] + [f"qd.{name}" for name in self.velocities]
+            names += [
+                *[f"q.{name}" for name in self.coordinates],
+                *[f"qd.{name}" for name in self.velocities],
+                "energy",
+            ]
             columns += [self.qd, self.energy[:, np.newaxis]]
-            names.append("energy")
             applied = self.graphs["tau"].outputs.values() if "tau" in self.graphs else ()
             if self.held is not None or any([node.value != 0.0 for node in applied]):
                 names += [f"tau.{name}" for name in self.velocities]
@@ -261,8 +254,8 @@ class Trajectory:
         rows = csv.writer(text, lineterminator="\n")
         rows.writerow(names)
         table = np.concatenate(columns, axis=1)
-        for i in range(0, len(table), _ROWS):  # as Python's numbers they are four times as large
-            rows.writerows(table[i : i + _ROWS].tolist())
+        for i in range(0, len(table), 10_000):  # as Python's numbers they are four times as large
+            rows.writerows(table[i : i + 10_000].tolist())
         return text.getvalue()
 
     @cached_property
@@ -280,7 +273,7 @@ class Trajectory:
         """Multipliers of constraints at the rows, {name: (T,)}: M qdd = tau + forces - damping qd - bias + J^T lambda.
 
         The force [N] or torque [N m] of a `Loop`, whose rows are named after it; of other rows J qd + a = 0 the power
-        [W] over the unit of J qd. 0 of rows that follow from others. Without constraints there are none.
+        [W] over the unit of J qd. 0 of rows that follow from others.
 
         Examples
         --------
@@ -308,12 +301,11 @@ class Trajectory:
         """Applied forces at the rows, (T, n); of a SampledController those held from there on."""
         return self._rows("tau")
 
-    def why_nan(self) -> WhyNan:
+    def why_nan(self) -> _shared.WhyNan:
         """Where a rate that is not finite comes from, or of finite rates a derivative of one; `print` it for the words.
 
-        The first row is looked at where a rate is not finite; of a run that stopped, then half a step and a step beyond
-        its last row, which a trial of a step may have come to; and then the first row with such a derivative by the
-        state. Numbers of the run, such as parameters, stand in the formulas as numbers.
+        The first row with a rate that is not finite is looked at; of a run that stopped, then half a step and a step
+        beyond its last row; and then the first row with such a derivative. Numbers of the run stand as numbers.
 
         Returns
         -------
@@ -347,35 +339,14 @@ class Trajectory:
         states = np.concatenate([self.q, self.qd], axis=1)
         return row_values(self.graphs[name], self.t, states, () if self.held is None else self.held.at(self.t))
 
-    @property
-    def success(self) -> bool:
-        """Whether the run reached t_end or ended at a terminal event."""
-        return self.stats.success
-
-    @property
-    def status(self) -> int:
-        """0: the end was reached; 1: a terminal event; -1: the run failed or was interrupted."""
-        return self.stats.status
-
-    @property
-    def message(self) -> str:
-        """Sentence that the run reached t_end, or where and why it stopped."""
-        return self.stats.message
-
-    @property
-    def nfev(self) -> int:
-        """Evaluations of the rate of the state."""
-        return self.stats.nfev
-
-    @property
-    def njev(self) -> int:
-        """Evaluations of its Jacobian."""
-        return self.stats.njev
-
-    @property
-    def nlu(self) -> int:
-        """LU factorizations."""
-        return self.stats.nlu
+    success = property(attrgetter("stats.success"), doc="Whether the run reached t_end or ended at a terminal event.")
+    status = property(attrgetter("stats.status"), doc="0: the end was reached; 1: a terminal event; -1: it failed.")
+    message = property(
+        attrgetter("stats.message"), doc="Sentence that the run reached t_end, or where and why it stopped."
+    )
+    nfev = property(attrgetter("stats.nfev"), doc="Evaluations of the rate of the state.")
+    njev = property(attrgetter("stats.njev"), doc="Evaluations of its Jacobian.")
+    nlu = property(attrgetter("stats.nlu"), doc="LU factorizations.")
 
     def _repr_html_(self) -> str | None:
         """The plot that a notebook shows, when a drawing package is installed (extra `viz`)."""

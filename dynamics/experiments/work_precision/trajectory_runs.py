@@ -17,7 +17,7 @@ from cgraph._shared import Array
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
 from ...simulation.outcome import Recorder
-from ...simulation.run_options import RunOptions
+from ...simulation.run_options import RunOptions, Span
 from ...simulation.stepper import Stepper, stepper
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
 from ..accuracy_task import AccuracyTask
@@ -80,11 +80,11 @@ def problem_of(task: AccuracyTask) -> Problem:
     return derive(task.model, dict(inputs.parameters) | dict.fromkeys(inputs.applied, 0.0))
 
 
-def finished(run: Stepper, start: Array) -> Outcome:
+def finished(run: Stepper, start: Array, span: Span) -> Outcome:
     """The run, to its end or until it has taken too long."""
     begin, last, status = time.perf_counter(), start, ""
     with np.errstate(all="ignore"):
-        for block in run.blocks(start):
+        for block in run.blocks(start, span):
             if len(block.x):
                 last = block.x[-1]
             if time.perf_counter() - begin > LONGEST_RUN:
@@ -93,12 +93,13 @@ def finished(run: Stepper, start: Array) -> Outcome:
     return Outcome(np.array(last), run.steps, run.rejected, run.evaluations, run.status or status)
 
 
-def recorded(run: Stepper, start: Array, times: Sequence[float]) -> Array:
-    """The states of a run at some times, (T, m)."""
-    recorder = Recorder(start, np.array(times))
+def recorded(run: Stepper, start: Array, span: Span) -> Array:
+    """The states of a run at the times of a span, (T, m)."""
+    recorder, times = Recorder(start, span), span.times
+    assert times is not None
     begin = time.perf_counter()
     with np.errstate(all="ignore"):
-        for block in run.blocks(start):
+        for block in run.blocks(start, span):
             recorder.add(block)
             if time.perf_counter() - begin > 2 * LONGEST_RUN:
                 break
@@ -137,17 +138,17 @@ class Ours(Solver):
         if self.kind == EQUAL and self._at_least(knob) > LONGEST_RUN:  # one that does not look at the clock on its way
             return Run(lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s"))
         compiled, options = self._plain, self._options(knob, [self.task.t_end])
-        return Run(lambda: finished(stepper(compiled, options), self.start))
+        return Run(lambda: finished(stepper(compiled, options), self.start, options))
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
-        run = stepper(self._plain, self._options(knob, [self.task.t_end], TRIAL))
-        begin = time.perf_counter()
-        finished(run, self.start)
+        options = self._options(knob, [self.task.t_end], TRIAL)
+        run, begin = stepper(self._plain, options), time.perf_counter()
+        finished(run, self.start, options)
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
         options = self._options(knob, self.task.times)
         compiled = self._dense if options.between else self._plain
-        return recorded(stepper(compiled, options), self.start, self.task.times)
+        return recorded(stepper(compiled, options), self.start, options)

@@ -22,14 +22,13 @@ from ...integrators import derive, in_form
 from ...systems.model import Model
 from ..applied_force import SampledController, with_applied
 from ..events.event import Event, as_events, event_program
-from ..outcome import split_crossings
+from ..outcome import split_crossings, unreached_momenta
 from ..progress_bar import Progress
-from ..run_options import METHOD, Options, RunOptions, require_room, time_span
+from ..run_options import METHOD, Options, RunOptions, known_options, require_room, time_span
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
-from ..unreached_momenta import unreached_momenta
 from .ensemble import Ensemble, Part, doubts
 from .store import Store, sweep_of
 from .task import Chunk, Task, Team, Workers, checked, finished
@@ -129,11 +128,11 @@ def simulate_many(
         raise TypeError(f"a SampledController may remember what it has seen, and so controls one run: {what}")
     folder = None if store is None else require_path("store", store)
     t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
-    run = RunOptions.of(method, options, t0, t_end, t_eval, without=["dense_output"])
+    run = RunOptions(t_end, method, t0=t0, t_eval=t_eval, **known_options(options, ["dense_output"]))
     watched, team = as_events(events), checked(workers)
     applied = with_applied(model, tau, parameters)
     start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
-    run.check(start.states)
+    run.check(run, start.states)
     if run.times is None and run.adaptive:
         how = "t_eval must say which times to record, or method='rk4' make equal steps"
         raise ValueError(f"{method!r} chooses the steps of each trajectory: {how}")

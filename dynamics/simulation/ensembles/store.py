@@ -164,7 +164,7 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "cgraph": cg.__version__,
         "llvmlite": [each.version for each in distributions(name="llvmlite")],
         "machine": platform.machine(),
-        **{field.name: getattr(options, field.name) for field in fields(options) if field.name != "progress"},
+        **{field.name: getattr(options, field.name) for field in fields(options) if field.init and field.name != "progress"},
         "rtol": options.relative,
         "atol": np.asarray(options.absolute).tolist(),
         "t_eval": _digest(options.row_times.tobytes()),

@@ -24,10 +24,9 @@ from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates
 from ..events.event import EventProgram
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
-from ..stepper import BLOCK_TIME, HELD, ChosenStepper, Stepper, StoppedError, beginning, over, stepper, tolerance
+from ..stepper import BLOCK_TIME, HELD, ChosenStepper, Stepper, StoppedError, first_registers, span_registers, stepper
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import EqualSteps, Numbers, even_steps, instants_of
-from ..steps.first_step import TOLERANCE
 from ..steps.state_sizes import Flags
 from ..steps.step_program import StepProgram, compile_steps
 from .ensemble import COLUMNS, Part
@@ -101,8 +100,7 @@ class LaneRun:
         self._passes = np.zeros((len(x), 2), np.int64)  # how many each has made, and how many marks of its clock passed
         self._set({"x": x, "p": p, "fresh": 1.0})
         if program.adaptive:
-            self._set(beginning(options, max(options.relative, program.finest)) | over(options.t0, options.t_end))
-            self._set({TOLERANCE: tolerance(options), "lanes.toward": options.direction})
+            self._set(first_registers(program, options) | span_registers(options) | {"lanes.toward": options.direction})
 
     def to_end(self, legs: Sequence[Leg], rows: Array, stopped: Stopped) -> LaneRuns:
         """Go all legs, with states for rows (k, T, m), NaN from where a run stops on."""
@@ -281,7 +279,7 @@ class Task:
                 run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
             run.set_parameters(p)
             if has_end and isinstance(run, ChosenStepper) and run.log is None:  # steps need not be looked at
-                if run.unseen(x):
+                if run.unseen(x, self.options):
                     part.reached(k, steps=run.steps, rejected=run.rejected, nfev=run.evaluations, dt=run.largest)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue

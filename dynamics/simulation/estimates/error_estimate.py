@@ -19,7 +19,7 @@ from cgraph import Graph, Node, floor, less, where
 from cgraph._shared import Array, kept_by_first
 
 from ...systems.arguments import TIME
-from ..run_options import RunOptions
+from ..run_options import Span, Steps
 from ..stepper import EqualStepper, Stepper
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import (
@@ -129,7 +129,7 @@ class Watch:
 
 
 def error_estimates(
-    program: StepProgram, options: RunOptions, beside: RunsBeside, watch: Watch, steps: int, rows: Sequence[Array]
+    program: StepProgram, options: Steps, beside: RunsBeside, watch: Watch, steps: int, rows: Sequence[Array]
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
@@ -200,15 +200,15 @@ class _Rows:
 class RunEstimate:
     """Estimate of the error of a run from its blocks as they come, if it is to be estimated."""
 
-    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
-        self._run, self._x, self._options, self.seconds = run, x, options, 0.0  # spent here
+    def __init__(self, run: Stepper, x: Array, span: Span) -> None:
+        self._run, self._x, self._span, self.seconds = run, x, span, 0.0  # spent here
         self._rows: _Rows | None = None
-        resetting = run.log is not None and run.log.resetting
-        if isinstance(run, EqualStepper) and options.estimated and run.control is None and not resetting:
+        resetting = run.events is not None and any([event.reset is not None for event in run.events.events])
+        if isinstance(run, EqualStepper) and run.options.estimated and run.control is None and not resetting:
             begin = time.perf_counter()
-            self._beside = runs_beside(equal_steps(options.instants, options.step), run.program.order)
+            self._beside = runs_beside(equal_steps(span.instants, run.options.step), run.program.order)
             self._rows = _Rows(self._beside.t, x)
-            self._watch = Watch(run.program.rate, np.array([run.parameters]), options.t0, x[None])
+            self._watch = Watch(run.program.rate, np.array([run.parameters]), span.t0, x[None])
             self.seconds = time.perf_counter() - begin
 
     def add(self, block: StepBlock) -> None:
@@ -228,12 +228,12 @@ class RunEstimate:
         rows = [self._rows.x[None, :count]]
         for stretches, _ in beside.runs:
             other = _Rows(beside.t[:count], self._x)
-            for block in run.beside(stretches, run.parameters).blocks(self._x * ASIDE):
+            for block in run.beside(stretches).blocks(self._x * ASIDE, self._span):
                 other.add(block)
                 if other.count == count:
                     break
             rows.append(other.x[None])
-        columns = error_estimates(run.program, self._options, beside, self._watch, run.steps, rows)
+        columns = error_estimates(run.program, run.options, beside, self._watch, run.steps, rows)
         error, last, said = [column[0] for column in columns.values()]
         self.seconds += time.perf_counter() - begin
         return float(error), float(last), said

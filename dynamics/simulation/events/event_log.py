@@ -339,10 +339,6 @@ class EventLog:
             self._last = part.part(slice(-1, None))
         return block
 
-    def anew(self) -> EventLog:
-        """A log of the same events, before the first step."""
-        return EventLog(self.program)
-
     @property
     def resets(self) -> int:
         """How many resets there were."""

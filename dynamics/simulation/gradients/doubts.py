@@ -11,9 +11,8 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..estimates.error_estimate import LAWLESS
-from ..outcome import MotionError
+from ..outcome import MotionError, unreached_momenta
 from ..steps.state_sizes import off_by, state_kinds
-from ..unreached_momenta import unreached_momenta
 from .differentiated_run import DifferentiatedRun
 
 LOOKS = 64  # at least, if there are so many steps, at which two motions are compared

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,8 +23,8 @@ from ...systems.ode_system import OdeSystem
 from ...systems.system import System
 from ..applied_force import SampledController, with_applied
 from ..events.event import Event, event_program
-from ..outcome import MotionError, Recorder, advise
-from ..run_options import METHOD, Options, RunOptions, time_span
+from ..outcome import MotionError, Recorder
+from ..run_options import METHOD, Options, RunOptions, known_options, time_span
 from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
@@ -161,13 +160,12 @@ class Motions:
         problem, options, start = self.equations.given, self.options, self.x[:, 0]
         parameters = self.inputs[: len(problem.parameters), 0]
         program = event_program(problem, self.events) if self.events else None
-        made = partial(stepper_of, problem, parameters=parameters.tolist(), events=program, between=bool(self.events))
         x = converted(problem.momentum, options.t0, start, parameters)
-        run, recorder = made(options), Recorder(x, None, options.t0, options.direction)
+        run = stepper_of(problem, options, parameters.tolist(), events=program, dense=bool(self.events))
+        recorder = Recorder(x, options)
         with np.errstate(all="ignore"):
-            for block in run.blocks(x):
+            for block in run.blocks(x, options):
                 recorder.add(block)
-        advise(run, recorder.last, options, x, made)
         if run.status:
             raise MotionError(f"the motion did not reach t_end, {run.status}")
         happened = [] if run.log is None else [(self.events[k], t) for k, t, _ in run.log.happened]
@@ -215,7 +213,7 @@ def motions_of(
     moving = applied.model
     constant = rows[:, 0] if many and rows is not None else applied.constant  # a motion for each of their first forces
     start = initial_values(moving, q, qd, constant, parameters, t0, many=many)
-    run.check(start.states)
+    run.check(run, start.states)
     inputs = state_inputs(moving)
     chosen, names = _names(wrt, inputs.applied, inputs.parameters, closed=callable(tau)), inputs.applied
     forced = rows is not None or TORQUE in chosen or not start.varied.keys().isdisjoint(names)
@@ -264,7 +262,7 @@ def _by_displacements(system: System, backend: str) -> Any:
 
 @memo(OPTIONS_KEPT)
 def _options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
-    return RunOptions.of(method, dict(options), t0, t_end, without=NOT_TAKEN)
+    return RunOptions(t_end, method, t0=t0, **known_options(dict(options), NOT_TAKEN))
 
 
 def _rows(tau: Any, n: int, *, many: bool) -> Array | None:

@@ -182,12 +182,12 @@ def test_a_reset_leaves_held_forces_and_periods_as_they_are(method: str) -> None
         assert (run.tau[rows] == run.held.tau[int(t / 0.1)]).all()
 
 
-def test_the_error_of_equal_steps_is_not_estimated() -> None:
-    regulator = Regulator()
-    tau = dyn.SampledController(regulator, 0.1)
+def test_the_error_of_a_sampled_controller_is_not_estimated() -> None:
+    tau = dyn.SampledController(Regulator(), 0.1)
     run = dyn.simulate(SPRINGS, **START, t_end=1.0, method="rk4", dt=0.1, tau=tau)
-    assert len(regulator.calls) == 10
-    assert (run.stats.error, run.stats.error_at_end, run.stats.warnings) == (None, None, ())
+    assert run.stats.error is run.stats.error_at_end is None
+    with raises(ValueError, match="run again with half of dt and compare"):
+        dyn.simulate(SPRINGS, **START, t_end=1.0, method="rk4", dt=0.1, tau=tau, estimate_error=True)
 
 
 def test_what_a_controller_raises_says_when() -> None:

@@ -5,7 +5,6 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from pytest import mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
-from dynamics.simulation import run as module
 from tests.slow import slow
 
 USUAL = "dop853 radau rk4 verlet".split()
@@ -99,50 +97,12 @@ def relaxing(pole: bool) -> dyn.OdeSystem:
 
 
 @mark.parametrize("method", ["dop853", "dopri5"])
-def test_a_method_is_advised_that_gets_through(method: str) -> None:
+def test_methods_for_stiff_systems_are_named_that_take_fewer_steps(method: str) -> None:
     with pytest.warns(dyn.SimulationWarning, match="the system is stiff") as caught:
         run = dyn.simulate(relaxing(False), [1.0], None, 0.1, method)
-    found = re.search(r"; try method='(\w+)', which comes to t = 0.1 s in (\d+) steps$", str(caught[0].message))
-    assert found is not None
-    other = dyn.simulate(relaxing(False), [1.0], None, 0.1, found[1])
-    assert (other.success, other.stats.steps, other.stats.steps < run.stats.steps) == (True, int(found[2]), True)
-
-
-@mark.parametrize("broken", [["radau"], ["radau", "rodas"]])
-def test_advice_never_costs_the_run(broken: list[str]) -> None:
-    made = module.stepper_of
-
-    def failing(problem: Any, options: Any, *arguments: Any, **named: Any) -> Any:
-        if options.method in broken:
-            raise RuntimeError("no code")
-        return made(problem, options, *arguments, **named)
-
-    with (
-        patch.object(module, "stepper_of", failing),
-        pytest.warns(dyn.SimulationWarning, match="the system is stiff") as caught,
-    ):
-        run = dyn.simulate(relaxing(False), [1.0], None, 0.1, "dopri5")
-    assert run.success
-    assert ("try method='rodas'" in str(caught[0].message)) == (len(broken) == 1)
-
-
-def test_ctrl_c_while_a_method_is_sought_is_said() -> None:
-    def interrupted(problem: Any, options: Any, *arguments: Any, **named: Any) -> Any:
-        if options.method == "radau":
-            raise KeyboardInterrupt
-        return made(problem, options, *arguments, **named)
-
-    made = module.stepper_of
-    with patch.object(module, "stepper_of", interrupted), pytest.warns(dyn.SimulationWarning):
-        run = dyn.simulate(relaxing(False), [1.0], None, 0.1, "dopri5")
-    assert (run.message, run.t[-1]) == ("interrupted after t = 0.1 s", 0.1)
-
-
-def test_a_method_that_stops_is_not_advised() -> None:
-    run, said = early(lambda: dyn.simulate(relaxing(True), [1.0, 1.0], None, 2.0, "dopri5", rtol=1e-4))
-    assert (len(said), len(run.stats.warnings)) == (1, 1)
-    assert "the system is stiff" in run.stats.warnings[0]
-    assert "try" not in run.stats.warnings[0]
+    for found in re.findall(r"method='(\w+)'", str(caught[0].message)):
+        other = dyn.simulate(relaxing(False), [1.0], None, 0.1, found)
+        assert (other.success, other.stats.steps < run.stats.steps) == (True, True)
 
 
 STEEP: dict[str, tuple[dyn.OdeSystem, str]] = {
@@ -159,7 +119,6 @@ def test_a_derivative_that_a_method_lacks_is_named_with_a_method_that_takes_none
     run, said = early(lambda: dyn.simulate(model, [0.0], None, 1.0, method, events=events))
     assert said == [f"the run {run.message}"]
     assert f"stopped at t = 0 s: the derivative of the rate of state 'x' {by} is not finite" in run.message
-    found = re.search(r"; try method='(\w+)', which comes to t = 1 s in (\d+) steps$", run.message)
+    found = re.search(r"method='(\w+)' takes none$", run.message)
     assert found is not None
-    other = dyn.simulate(model, [0.0], None, 1.0, found[1], events=events)
-    assert (other.success, other.stats.steps) == (True, int(found[2]))
+    assert dyn.simulate(model, [0.0], None, 1.0, found[1], events=events).success
