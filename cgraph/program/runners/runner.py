@@ -32,7 +32,17 @@ def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
 
 
 class Record(NamedTuple):
-    """The rows of a run, (rows, width), or (rows, width, N) of N runs at once, and how many passes were run."""
+    """The rows of a run, (rows, width), or (rows, width, N) of N runs at once, and how many passes were run.
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Program, runner
+    >>> x = cg.variable("x")
+    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
+    >>> run.run(run.memory({"x": 8.0}), passes=4, every=2)
+    Record(rows=array([[2. ],
+           [0.5]]), passes=4)
+    """
 
     rows: Array
     passes: int
