@@ -14,21 +14,12 @@ from ...core.evaluation import Array, real_array
 from ...util.memory import require_memory
 from ...util.require import require_mapping, require_whole
 from ..program import Program
+from ..writer import offsets
 
 if TYPE_CHECKING:
     from .batch_code import LaneCode
 
 Start = Callable[[], Mapping[str, Array]]  # gives initial values of registers
-
-
-def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
-    """Place of each register in the memory, its length padded to whole vectors; under "" the size of it all."""
-    at, places = 0, {}
-    for name, length in registers.items():
-        places[name] = at
-        at += length if length < 2 else -(-length // width) * width
-    places[""] = at
-    return places
 
 
 class Record(NamedTuple):
