@@ -16,6 +16,16 @@ Lengths = tuple[int, ...]  # of the registers that are a function's arguments
 Text = Callable[[FunctionWriter, str], None]  # what writes a function of that name
 
 
+def offsets(registers: Registers, width: int) -> dict[str, int]:
+    """Place of each register in the memory, its length padded to whole vectors; under "" the size of it all."""
+    at, places = 0, {}
+    for name, length in registers.items():
+        places[name] = at
+        at += length if length < 2 else -(-length // width) * width
+    places[""] = at
+    return places
+
+
 class Functions:
     """The functions of one module, each written once: `void f(in0, in1, .., out0, out1, ..)`, pointers to registers.
 

@@ -20,7 +20,7 @@ from ...util.memory import aligned, lies_in_rows
 from ..fuse import fused
 from ..many import many_keeping
 from ..program import Program, whole_graph
-from .runner import offsets
+from ..writer import offsets
 
 ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0)"  # a pass without a record
 Source = Callable[[Program, Arithmetic], str]  # writes the module with `run`

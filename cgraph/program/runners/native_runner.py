@@ -27,8 +27,8 @@ from ..fuse import fused
 from ..program import Program, outliving, whole_graph
 from ..statement import row_of
 from ..statements.call import Call
-from ..writer import Functions, Writer
-from .runner import Record, Runner, Start, offsets
+from ..writer import Functions, Writer, offsets
+from .runner import Record, Runner, Start
 
 if TYPE_CHECKING:
     from ...codegen.batch_ir import Batch

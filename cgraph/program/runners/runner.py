@@ -14,6 +14,7 @@ from ...core.evaluation import Array, real_array
 from ...util.memory import require_memory
 from ...util.require import require_mapping, require_whole
 from ..program import Program
+from ..writer import offsets
 
 if TYPE_CHECKING:
     from .batch_code import LaneCode
@@ -21,18 +22,18 @@ if TYPE_CHECKING:
 Start = Callable[[], Mapping[str, Array]]  # gives initial values of registers
 
 
-def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
-    """Place of each register in the memory, its length padded to whole vectors; under "" the size of it all."""
-    at, places = 0, {}
-    for name, length in registers.items():
-        places[name] = at
-        at += length if length < 2 else -(-length // width) * width
-    places[""] = at
-    return places
-
-
 class Record(NamedTuple):
-    """The rows of a run, (rows, width), or (rows, width, N) of N runs at once, and how many passes were run."""
+    """The rows of a run, (rows, width), or (rows, width, N) of N runs at once, and how many passes were run.
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Program, runner
+    >>> x = cg.variable("x")
+    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
+    >>> run.run(run.memory({"x": 8.0}), passes=4, every=2)
+    Record(rows=array([[2. ],
+           [0.5]]), passes=4)
+    """
 
     rows: Array
     passes: int
