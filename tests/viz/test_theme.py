@@ -18,7 +18,6 @@ from viz import theme
         ("x_dot", "x_dot"),  # a tangent in general
         ("q_dot_max", "q_dot_max"),
         ("dt", "dt"),
-        ("2q", "2q"),
     ],
 )
 def test_names_are_shown_in_mathematical_letters(name: str, shown: str) -> None:

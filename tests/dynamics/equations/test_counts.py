@@ -67,3 +67,10 @@ def test_a_dense_solve_that_saves_more_than_a_tenth_of_the_nodes_is_taken() -> N
     auto, recursive, dense = (dyn.forward_dynamics(skew, method) for method in ("auto", "recursive", "dense"))
     assert len(dense.nodes) < 0.9 * len(recursive.nodes)
     assert structure_hash(auto) == structure_hash(dense)
+
+
+@mark.parametrize("formulation", ["by_definition", "kinetic_only"])
+@mark.parametrize("n", [1, 3, 10])
+def test_the_chain_rule_is_smaller_than_the_embedded_formulations(n: int, formulation: str) -> None:
+    ours, theirs = (dyn.inverse_dynamics(equal_links(n), each).counts() for each in ("chain_rule", formulation))
+    assert all(getattr(ours, size) < getattr(theirs, size) for size in ("nodes", "edges", "depth"))

@@ -65,3 +65,9 @@ def test_spurious_is_the_branch_of_the_spring() -> None:
 def test_nothing_is_spurious_in_a_right_formulation_of_one_joint(formulation: str) -> None:
     assert dyn.spurious_nodes(dyn.inverse_dynamics(SPRING_MASS, formulation)) == frozenset()
     assert dyn.spurious_nodes(dyn.momentum_rate(SPRING_MASS, formulation)) == frozenset()
+
+
+def test_the_chain_rule_has_no_trace_of_the_euler_relation() -> None:
+    graph = dyn.inverse_dynamics(SPRING_MASS, "chain_rule")
+    assert not {"dt", "q0_old", "qd0_old"} & set(graph.input_names)
+    assert "Euler relation" not in graph.counts().by_tag
