@@ -15,12 +15,12 @@ from cgraph._shared import Array
 
 from ...systems.model import Model
 from ..applied_force import Constant
-from ..events.event import Event, as_events
+from ..events.event import Event
 from ..run_options import Options
 from ..trajectory import SimulationWarning
 from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
-from .motions import motions_of
+from .motions import Differentiation
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,14 +114,14 @@ def sensitivities(
     >>> result["m"][[100, 200]].round(4).tolist()
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
-    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, as_events(events), (None, None), options)
+    motions = Differentiation(model, (None, None), t_end, method, tau, parameters, wrt, events, options)(q, qd)
     if motions.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motions.tau.shape[:-1]}: gradient takes a row a step")
     run = DifferentiatedRun(motions, forwards=True)
     for text in doubts(run)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     # a column for each number of `wrt`: the transpose of how cotangents of it are made of those of x, t and inputs
-    units = np.eye(len(motions.point()))
+    units = np.eye(motions.problem.size + 1 + len(motions.inputs))
     by = {name: np.atleast_2d(rows) for name, rows in motions.of([0] * len(units)).by_names(units).items()}
     t, x, t_dot, x_dot = run.tangents(np.concatenate([*by.values()]).T)
     ends, nq = np.cumsum([len(rows) for rows in by.values()]), motions.problem.nq
