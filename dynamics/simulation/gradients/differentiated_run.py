@@ -114,12 +114,10 @@ class DifferentiatedRun:
 
         def fed(first: int, last: int) -> Array:
             """Inputs of the steps first .. last - 1, (.., width, N), or one for all motions without own forces."""
-            part = slice(first, last)
+            rows = np.stack([steps.t[first:last], steps.h[first:last]], axis=1)[:, :, None]
             if not motions.each_step:
-                return np.stack([steps.t[part], steps.h[part]], axis=1)[:, :, None]
-            rows = np.empty((last - first, 2 + motions.equations.forces, many))
-            rows[:, 0].T[...], rows[:, 1].T[...], rows[:, 2:] = steps.t[part], steps.h[part], motions.tau[part]
-            return rows
+                return rows
+            return np.concatenate([np.broadcast_to(rows, (*rows.shape[:2], many)), motions.tau[first:last]], axis=1)
 
         fits = every > 0 or 8 * step.forward.program.width * count * many <= MOST_RECORDED
         tape = Tape(step, values, fed, many, 0 if fits else math.ceil(math.sqrt(count)), every or 1)
@@ -165,7 +163,7 @@ class DifferentiatedRun:
             last = min(first + PIECE, len(segment.steps.h))
             # a row ends with the state after the step
             rows = run_passes(tape.of.forward, memory, last - first, 1, tape.feed(first, last))[:, :, k]
-            bad = ~np.isfinite(rows[:, -m:]).all(axis=1) | (rows[:, -m - 1] != 0.0 if self.programs.failed else False)
+            bad = ~np.isfinite(rows[:, -m:]).all(axis=1) | (rows[:, -m - 1] != 0.0 if self.programs[-1] else False)
             if bad.any():
                 break
             before = rows[-1, -m:]

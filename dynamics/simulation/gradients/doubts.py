@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -22,21 +21,26 @@ LOOSE_TOLERANCE = 1e-3  # a relative tolerance above it tells of a motion's grow
 ASIDE = 1.0 + 2.0**-52  # by which the other motion starts aside: what a rounding grows to is part of the error
 
 
-def doubts(
-    run: DifferentiatedRun,
-    values: Array | tuple[()] = (),
-    gradients: Mapping[str, Array] = MappingProxyType({}),
-    slopes: tuple[Array, Array] | None = None,
-) -> list[list[str]]:
-    """A sentence each, of every motion, which has an end.  values (N,), gradients (.., N): of the losses.
-
-    slopes: of the losses by the starts of the motions and by their ends, (m, N).
-    """
+def doubts(run: DifferentiatedRun) -> list[list[str]]:
+    """A sentence each, of every motion, which has an end."""
     said = [[*run.motions.said] for _ in range(run.motions.many)]
-    for sentences in (_other_momenta(run), _half_steps(run), [] if slopes is None else _chaos(run, *slopes)):
+    for sentences in (_other_momenta(run), _half_steps(run)):
         for texts, more in zip(said, sentences, strict=False):  # no sentences: of no motion
             texts += more
-    for k, (texts, value) in enumerate(zip(said, values, strict=False)):
+    return said
+
+
+def loss_doubts(
+    run: DifferentiatedRun, values: Array, gradients: Mapping[str, Array], start: Array, end: Array
+) -> list[list[str]]:
+    """Doubts of motions and of their losses, values (N,) and gradients (.., N).
+
+    start, end: slopes of the losses by the states there, (m, N).
+    """
+    said = doubts(run)
+    for texts, more in zip(said, _chaos(run, start, end), strict=False):
+        texts += more
+    for k, (texts, value) in enumerate(zip(said, values, strict=True)):
         if not np.isfinite(value):
             texts.append(f"the loss is {value} of a motion that is finite")
         else:

@@ -22,7 +22,7 @@ from ..outcome import MotionError
 from ..run_options import Options
 from ..trajectory import SimulationWarning
 from .differentiated_run import DifferentiatedRun
-from .doubts import doubts
+from .doubts import loss_doubts
 from .motion_programs import outputs_at
 from .motions import TORQUE, Differentiation, Loss, Motions
 
@@ -264,7 +264,7 @@ def _gradients(motions: Motions) -> tuple[DifferentiatedRun, Array, dict[str, Ar
     if motions.each_step and TORQUE in gradients:
         rows[-1] += end[m + 1 :][: motions.equations.forces]  # what the final loss has of the force itself
         gradients[TORQUE] = rows
-    return run, values, gradients, doubts(run, values, gradients, (start[:m], end[:m]))
+    return run, values, gradients, loss_doubts(run, values, gradients, start[:m], end[:m])
 
 
 @kept_by_first

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -53,14 +53,6 @@ class MotionEquations:
     def registers(self, inputs: Array) -> dict[str, Array]:
         """The registers of the parameters, of these end to end."""
         return dict(zip(PARAMETERS, np.split(inputs, [self.forces, self.forces + len(self.names)]), strict=True))
-
-    def values(self, p: Array, backend: str) -> Array:
-        """p and c, (P + C, N), from p (P, N)."""
-        return p if self.numbers is None else outputs_at(self.numbers, backend, p)
-
-    def by_parameters(self, p: Array, bars: Array, backend: str) -> Array:
-        """Cotangents of p from those of p and c."""
-        return bars if self.numbers is None else outputs_at(pullback(self.numbers), backend, np.concatenate([p, bars]))
 
 
 @kept_by_first
@@ -123,19 +115,6 @@ def outputs_at(graph: Graph, backend: str, x: Array) -> Array:
     return values
 
 
-class MotionPrograms(NamedTuple):
-    """The programs of a motion.
-
-    start: from x to what the first step reads; None where that is x.
-    step: one step, with the running loss where there is one; fed t, h, and tau where it changes.
-    failed: a register that is not 0 after steps whose equations were not solved; empty where there is none.
-    """
-
-    start: Along | None
-    step: Along
-    failed: str
-
-
 @memo(PROGRAMS_KEPT)
 def motion_programs(
     equations: MotionEquations,
@@ -147,9 +126,11 @@ def motion_programs(
     each_step: bool,
     forwards: bool,
     many: bool,
-) -> MotionPrograms:
-    """The programs; of the last few motions, those made before.
+) -> tuple[Along | None, Along, str]:
+    """The programs of a motion, of the last few those made before, and their register `failed`.
 
+    The first is from x to what the first step reads, None where that is x; the other one step with the running loss,
+    fed t, h, and tau where it changes.  failed: not 0 after steps whose equations were not solved; may be empty.
     wrt: among "tau", "p", "c", "h" and "t", besides the state.  running: the loss of a step.  each_step: whether it has
     forces of its own.  forwards: tangents are pushed on, else cotangents pulled back.  many: motions go side by side.
     """
@@ -188,7 +169,7 @@ def motion_programs(
         first = Along(start, tangent(start, ["x"]) if forwards else adjoint(start, seeds, at_start), read, backend)
     results = [name for name in ("x", LOSS, made.failed) if name in step.handed]
     rows = [step.handed[name] for name in (made.failed, "x") if name in step.handed]
-    return MotionPrograms(first, Along(step, linear, results, backend, rows), made.failed)
+    return first, Along(step, linear, results, backend, rows), made.failed
 
 
 def _separate(statements: Sequence[Statement]) -> list[Statement]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from cgraph import Graph, Node
 from cgraph._shared import Array, kept_by_first, memo, or_nearest, real_array, require_sequence
 from cgraph.extend import Builder, topological
 
-from ...equations.state_equation import FORMS, state_inputs
+from ...equations.state_equation import FORMS, StateInputs, state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Problem, quantity
 from ...systems.arguments import Parameters, call_user_function
@@ -30,7 +30,7 @@ from ..run_options import METHOD, Options, RunOptions, time_span
 from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
-from .motion_programs import MotionEquations, motion_equations, outputs_at
+from .motion_programs import MotionEquations, motion_equations, outputs_at, pullback
 
 Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"
@@ -149,8 +149,11 @@ class Motions:
             q = outputs_at(_by_displacements(problem.system), backend, np.concatenate([self.x[: problem.nq], q]))
         by = {START: q, VELOCITY: x[problem.nq :], TORQUE: inputs[: equations.forces]}
         if self.by_parameters:
-            p, of_p = self.values[: len(equations.names)], inputs[equations.forces :]
-            by |= dict(zip(equations.names, equations.by_parameters(p, of_p, backend), strict=True))
+            of_p = inputs[equations.forces :]
+            if equations.numbers is not None:
+                values = np.concatenate([self.values[: len(equations.names)], of_p])
+                of_p = outputs_at(pullback(equations.numbers), backend, values)
+            by |= dict(zip(equations.names, of_p, strict=True))
         return {name: by[name] for name in self.wrt}
 
     def of(self, part: slice | list[int]) -> Motions:
@@ -197,9 +200,10 @@ class Motions:
 
 
 class Differentiation:
-    """A run, its losses and what to differentiate by; a call makes its motions from starts, all arguments checked.
+    """A run, its losses and what to differentiate by; a call makes its motions from starts.
 
-    many: N motions, else one, whose arguments have no axis N.
+    losses: of the end, and of each step.  many: N motions, else one, whose arguments have no axis N.
+    Raises TypeError or ValueError naming the argument, as a call does.
     """
 
     def __init__(
@@ -223,88 +227,78 @@ class Differentiation:
         self._many, self._closed = many, callable(tau)
         own = _with_loss_parameters(as_equations(model), parameters, *losses)
         t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
-        form, numbers = options.pop("form", FORMS[0]), None if callable(tau) else real_array("tau", tau)
-        self._rows = numbers if numbers is not None and numbers.ndim == 2 + many else None
-        equal = self._rows is not None
+        form, rows = options.pop("form", FORMS[0]), None if callable(tau) else real_array("tau", tau)
+        rows = rows if rows is not None and rows.ndim == 2 + many else None
         if method is None:
-            method = EQUAL if equal or options.get("dt") is not None else METHOD
+            method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
         plain = all([type(each) in _PLAIN for each in (method, *options.values())])
         settings = (_options if plain else _options.__wrapped__)(method, *options.items()).over(t0, t_end, None)
-        if equal and (settings.adaptive or self._events):
-            needed = (
-                "equal steps without events" if self._events else f"equal steps: method {method!r} chooses its steps"
-            )
-            raise ValueError(f"tau of shape {np.shape(tau)} is one row a step, which needs {needed}")
-        self._options = settings
-        self._run = Run(own, settings, 0.0 if equal else tau, self._events, form, False, (), parameters)
+        if rows is not None:
+            _require_rows(rows, len(state_inputs(own).applied), settings, many=many, watched=bool(self._events))
+        count = (
+            step_count(settings.length, settings.step) if rows is None or settings.dt is not None else rows.shape[-2]
+        )
+        chosen = settings.adaptive or self._events
+        self._steps = () if chosen else (_equal_stretch(t0, settings.t_end, count),)
+        self._rows, self._options = rows if many or rows is None else rows[None], settings
+        self._run = Run(own, settings, tau if rows is None else 0.0, self._events, form, False, (), parameters)
 
     def __call__(self, q: ArrayLike, qd: ArrayLike | None) -> Motions:
-        """The motions. Raises TypeError or ValueError naming the argument."""
-        run, options, many, inputs = self._run, self._options, self._many, state_inputs(self._run.model)
-        rows, names = self._checked_rows(len(inputs.applied)), inputs.applied
-        constant = rows[:, 0] if many and rows is not None else run.applied.constant  # of N motions the first forces
-        start = initial_values(run.model, q, qd, constant, self._parameters, options.t0, many=many)
+        """The motions."""
+        run, options, rows, inputs = self._run, self._options, self._rows, state_inputs(self._run.model)
+        constant = rows[:, 0] if self._many and rows is not None else run.applied.constant  # of rows the first ones
+        start = initial_values(run.model, q, qd, constant, self._parameters, options.t0, many=self._many)
         options.check(start.states)
-        wrt = self._names(names, inputs.parameters)
+        wrt, names, count = self._names(inputs), inputs.applied, len(start.x)
         forced = rows is not None or TORQUE in wrt or not start.varied.keys().isdisjoint(names)
         forces = names if forced or any([start.bound[name] != 0.0 for name in names]) else ()
         free = {*forces, *wrt, *(self._parameters or ())}  # what a caller changes from call to call stays an input
-        problem = run.equations({name: value for name, value in start.bound.items() if name not in free})
-        equations, columns, count = motion_equations(problem, len(forces)), start.bound | start.varied, len(start.x)
+        derived = run.equations({name: value for name, value in start.bound.items() if name not in free})
+        equations, columns = motion_equations(derived, len(forces)), start.bound | start.varied
         numbers = np.empty((len(forces) + len(equations.names), count))
         for row, name in zip(numbers, [*forces, *equations.names], strict=True):
             row[:] = columns[name]
-        tau, p = numbers[: len(forces)], numbers[len(forces) :]
+        tau, values, problem = numbers[: len(forces)], numbers[len(forces) :], equations.problem
         if rows is not None:
             tau = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
-        final, running = self._losses
-        losses = (
-            _loss_graph(equations.problem, "loss", final),
-            _loss_graph(equations.problem, "running", running, run.applied.nodes),
-        )
-        watched = event_program(equations.problem, self._events) if self._events else None
-        steps = () if options.adaptive or watched else (self._equal_steps(None if rows is None else rows.shape[1]),)
-        values = equations.values(p, options.backend)
-        return Motions(equations, options, start.x.T.copy(), tau, values, wrt, *losses, watched, steps)
+        if equations.numbers is not None:
+            values = outputs_at(equations.numbers, options.backend, values)
+        final = _loss_graph(problem, "loss", self._losses[0])
+        running = _loss_graph(problem, "running", self._losses[1], run.applied.nodes)
+        watched = event_program(problem, self._events) if self._events else None
+        return Motions(equations, options, start.x.T.copy(), tau, values, wrt, final, running, watched, self._steps)
 
-    def _checked_rows(self, n: int) -> Array | None:
-        """tau where it is one row a step, (N, steps, n), N = 1 of one motion."""
-        rows = self._rows
-        if rows is None:
-            return None
-        if not rows.size or rows.shape[-1] != n:
-            shapes = "(N, n) or (N, steps, n)" if self._many else "(n,) or (steps, n)"
-            raise ValueError(f"tau must have shape {shapes} with n = {n} velocities, got {rows.shape}")
-        if not np.isfinite(rows).all():
-            raise ValueError("tau must be finite")
-        return rows if self._many else rows[None]
-
-    def _equal_steps(self, rows: int | None) -> Stretch:
-        """Equal steps; so many where rows say it."""
-        options = self._options
-        count = step_count(options.length, options.step) if rows is None or options.dt is not None else rows
-        if rows is not None and rows != count:
-            steps = f"{count} steps of dt = {options.step:g} s"
-            raise ValueError(f"tau has {rows} rows, and there are {steps}: leave out dt")
-        return _equal_stretch(options.t0, options.t_end, count)
-
-    def _names(self, applied: Sequence[str], parameters: Iterable[str]) -> tuple[str, ...]:
+    def _names(self, inputs: StateInputs) -> tuple[str, ...]:
         """Names to differentiate by: by default the start, and the applied force where it is numbers."""
-        usual = [START] if not applied else [START, VELOCITY] if self._closed else [START, VELOCITY, TORQUE]
+        usual = [START, VELOCITY, TORQUE][: 3 - self._closed] if inputs.applied else [START]
         if self._wrt is None:
             return tuple(usual)
         names = [self._wrt] if isinstance(self._wrt, str) else require_sequence("wrt", self._wrt, "names")
-        known = dict.fromkeys([*usual, *parameters])
+        known = dict.fromkeys([*usual, *inputs.parameters])
         for name in names:
             if not isinstance(name, str) or name not in known:
                 raise ValueError(f"wrt: the motion has no input {name!r:.60} ({or_nearest(str(name), list(known))})")
-            if name in usual and name in parameters:
-                raise ValueError(
-                    f"wrt {name!r} is the start or the applied force, and a parameter: rename the parameter"
-                )
+            if name in usual and name in inputs.parameters:
+                both = "the start or the applied force, and a parameter"
+                raise ValueError(f"wrt {name!r} is {both}: rename the parameter")
         if not names:
             raise ValueError(f"wrt needs at least one of {', '.join(usual)} and the parameters")
         return tuple(dict.fromkeys(names))
+
+
+def _require_rows(rows: Array, n: int, options: RunOptions, *, many: bool, watched: bool) -> None:
+    """Raises ValueError for rows of forces, one a step, that are of another shape or no steps."""
+    if options.adaptive or watched:
+        needed = " without events" if watched else f": method {options.method!r} chooses its steps"
+        raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs equal steps{needed}")
+    if not rows.size or rows.shape[-1] != n:
+        shapes = "(N, n) or (N, steps, n)" if many else "(n,) or (steps, n)"
+        raise ValueError(f"tau must have shape {shapes} with n = {n} velocities, got {rows.shape}")
+    if not np.isfinite(rows).all():
+        raise ValueError("tau must be finite")
+    if options.dt is not None and (count := step_count(options.length, options.step)) != rows.shape[-2]:
+        steps = f"{count} steps of dt = {options.step:g} s"
+        raise ValueError(f"tau has {rows.shape[-2]} rows, and there are {steps}: leave out dt")
 
 
 def _with_loss_parameters(own: Equations, parameters: object, loss: Loss | None, running: Loss | None) -> Equations:
@@ -335,19 +329,15 @@ def _loss_graph(problem: Problem, what: str, loss: Loss | None, tau: Sequence[No
     places = {each: k for k, each in enumerate(order)}
     leaves = [each.name if each.value is None else float(each.value).hex() for each in order]  # 0.0 and -0.0 apart
     key = [(each.op.name, leaf, *[places[arg] for arg in each.args]) for each, leaf in zip(order, leaves, strict=True)]
-    return _observed(_Loss(problem, tuple(key), node))
-
-
-@dataclass(frozen=True)
-class _Loss:
-    problem: Problem
-    key: tuple[object, ...]
-    node: Node = field(compare=False)
+    if not (kept := _place(problem, tuple(key))):
+        kept.append(problem.observed({"loss": node}))
+    return kept[0]
 
 
 @memo(LOSSES_KEPT)
-def _observed(loss: _Loss) -> Graph:
-    return loss.problem.observed({"loss": loss.node})
+def _place(problem: Problem, key: tuple[object, ...]) -> list[Graph]:
+    """Place for the graph of a loss of these operations."""
+    return []
 
 
 @kept_by_first
