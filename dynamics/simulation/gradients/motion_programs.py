@@ -52,7 +52,8 @@ class MotionEquations:
 
     def registers(self, inputs: Array) -> dict[str, Array]:
         """The registers of the parameters, of these end to end."""
-        return dict(zip(PARAMETERS, np.split(inputs, [self.forces, self.forces + len(self.names)]), strict=True))
+        p = self.forces + len(self.names)
+        return dict(zip(PARAMETERS, (inputs[: self.forces], inputs[self.forces : p], inputs[p:]), strict=True))
 
 
 @kept_by_first

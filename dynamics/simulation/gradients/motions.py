@@ -235,11 +235,6 @@ class Differentiation:
         settings = (_options if plain else _options.__wrapped__)(method, *options.items()).over(t0, t_end, None)
         if rows is not None:
             _require_rows(rows, len(state_inputs(own).applied), settings, many=many, watched=bool(self._events))
-        count = (
-            step_count(settings.length, settings.step) if rows is None or settings.dt is not None else rows.shape[-2]
-        )
-        chosen = settings.adaptive or self._events
-        self._steps = () if chosen else (_equal_stretch(t0, settings.t_end, count),)
         self._rows, self._options = rows if many or rows is None else rows[None], settings
         self._run = Run(own, settings, tau if rows is None else 0.0, self._events, form, False, (), parameters)
 
@@ -266,7 +261,12 @@ class Differentiation:
         final = _loss_graph(problem, "loss", self._losses[0])
         running = _loss_graph(problem, "running", self._losses[1], run.applied.nodes)
         watched = event_program(problem, self._events) if self._events else None
-        return Motions(equations, options, start.x.T.copy(), tau, values, wrt, final, running, watched, self._steps)
+        steps: tuple[Stretch, ...] = ()
+        if not (options.adaptive or watched):
+            by_rows = rows is not None and options.dt is None
+            steps_count = len(tau) if by_rows else step_count(options.length, options.step)
+            steps = (_equal_stretch(options.t0, options.t_end, steps_count),)
+        return Motions(equations, options, start.x.T.copy(), tau, values, wrt, final, running, watched, steps)
 
     def _names(self, inputs: StateInputs) -> tuple[str, ...]:
         """Names to differentiate by: by default the start, and the applied force where it is numbers."""
