@@ -21,7 +21,6 @@ from cgraph.extend import Runner
 from ..events.event import WatchedEvent
 from ..outcome import MotionError
 from ..stepper import nonfinite, unsolved
-from ..steps.dense_output import Indices
 from ..steps.row_values import values_of
 from .motion_programs import LOSS, motion_programs, pullback
 from .motions import TORQUE, Motions, Stretch
@@ -53,10 +52,8 @@ class DifferentiatedRun:
 
     forwards: tangents are to be pushed on, else cotangents pulled back.
     every: keep the states after every so many steps alone, of each segment; nothing goes along the motion.
-    x, t: the end of the motion, (m, N), and all times.  loss: the running one, (N,).
+    x, t: the end, (m, N), not finite of one among others that failed, and all times.  loss: the running one, (N,).
     checkpoints: steps between two states that were kept; 0 where all were.
-    Raises MotionError for a motion alone that does not stay finite, or whose equations are not solved; one side by side
-    with others has an end that is not finite.
     """
 
     def __init__(self, motions: Motions, *, forwards: bool = False, every: Sequence[int] = ()) -> None:
@@ -153,17 +150,14 @@ class DifferentiatedRun:
         what = nonfinite(names, x) or unsolved(names, before, x)
         return f"stopped at t = {segment.steps.t[first + step + 1]:.6g} s: {what}"
 
-    def states(self, segment: Segment) -> tuple[Indices, Array]:
-        """After how many steps (T,), and states (T, m, N), from the start to the end: all that are kept."""
-        tape, count, m = segment.tape, len(segment.steps.h), len(segment.x)
+    def states(self, segment: Segment) -> Array:
+        """States (T, m, N) from the start to the end: all that are kept."""
+        tape, m = segment.tape, len(segment.x)
         if tape.checkpoints:
-            kept = [tape.value("x", memory) for *_, memory in tape.blocks]
-            return np.array([*[block.first for block in tape.blocks], count]), np.array([*kept, segment.x])
-        numbers = [np.arange(first + tape.every, last + 1, tape.every) for first, last, _ in tape.blocks]
-        rows = [kept[:, -m:] for *_, kept in tape.blocks]
-        if not len(numbers[-1]) or numbers[-1][-1] != count:
-            numbers, rows = [*numbers, np.array([count])], [*rows, segment.x[None]]
-        return np.concatenate([[0], *numbers]), np.concatenate([segment.begin[None], *rows])
+            return np.array([*[tape.value("x", memory) for *_, memory in tape.blocks], segment.x])
+        rows = np.concatenate([segment.begin[None], *[kept[:, -m:] for *_, kept in tape.blocks]])
+        whole = (len(rows) - 1) * tape.every == len(segment.steps.h)
+        return rows if whole else np.concatenate([rows, segment.x[None]])
 
     def cotangents(self, bars: Array) -> tuple[Array, Array]:
         """Cotangents (m + 1 + .., N) of start, t and inputs, from those of the end; and rows of forces of each step."""
@@ -206,10 +200,7 @@ class DifferentiatedRun:
         return float(run_passes(derivative, memory, 1, 1, rows[-1:, : derivative.program.feed_width])[0, 1, 0])
 
     def tangents(self, dots: Array) -> tuple[Array, Array]:
-        """States (steps + 1, m) of one motion without events, and their tangents (steps + 1, m, k).
-
-        dots: tangents (m + 1 + .., k) of the start, of t and of inputs, along k directions.
-        """
+        """States (steps + 1, m) of a motion without events, and tangents (.., m, k), from those of start, t, inputs."""
         (segment,), m, many = self.segments, len(self.x), dots.shape[1]
         tape, start = segment.tape, segment.start
         vectors = {"x": dots[:m], **self.motions.equations.registers(dots[m + 1 :])}
@@ -220,7 +211,7 @@ class DifferentiatedRun:
             self._require_solved(failed)
             vectors |= found
         push, memory = tape.of.derivative, tape.derivative_memory(vectors, many)
-        states, tangents = [segment.begin.T], [dots[None, :m]]
+        states, tangents = [segment.begin.T], [push.read(memory, tape.of.linear.vectors["x"]).copy()[None]]
         for *_, rows in tape.records(backwards=False):
             states.append(rows[:, -m:, 0])
             tangents.append(_run_all(push, memory, rows))

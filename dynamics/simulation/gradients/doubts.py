@@ -28,10 +28,7 @@ def doubts(run: DifferentiatedRun) -> list[list[str]]:
 def loss_doubts(
     run: DifferentiatedRun, values: Array, gradients: Mapping[str, Array], start: Array, end: Array
 ) -> list[list[str]]:
-    """Doubts of motions and of their losses, values (N,) and gradients (.., N).
-
-    start, end: slopes of the losses by the states there, (m, N).
-    """
+    """Doubts of motions and of their losses, whose slopes by the states at start and end are (m, N)."""
     said = doubts(run)
     for texts, more in zip(said, _chaos(run, start, end), strict=False):
         texts += more
@@ -46,10 +43,7 @@ def loss_doubts(
 
 
 def _chaos(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
-    """Whether the error at the start of a motion may change the loss by more than its own size does.
-
-    start, end: slopes of the loss by the state there. Of a loss along the way alone, its value is compared.
-    """
+    """Whether the error at the start of a motion may change the loss by more than its own size does."""
     motions, options = run.motions, run.motions.options
     error = min(options.relative, LOOSE_TOLERANCE) if options.adaptive else ASIDE - 1.0
     with np.errstate(all="ignore"):
@@ -57,7 +51,7 @@ def _chaos(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
         slope, loss = np.abs(end), np.abs(run.loss)
         if not (change > (slope * np.abs(run.x)).sum(axis=0) + loss).any():  # the end is enough
             return []
-        largest = np.max([np.abs(run.states(each)[1]).max(axis=0) for each in run.segments], axis=0)
+        largest = np.max([np.abs(run.states(each)).max(axis=0) for each in run.segments], axis=0)
         whole = (slope * largest).sum(axis=0) + loss
         ratios = np.where(whole > 0.0, change / whole, 0.0)
     what = f"rtol = {error:g}" if options.adaptive else "rounding"
@@ -76,19 +70,19 @@ def _half_steps(run: DifferentiatedRun) -> list[list[str]]:
         return said
     halves = tuple([each.steps.half_steps() for each in run.segments])
     tau = np.repeat(motions.tau, 2, axis=0) if motions.each_step else motions.tau
-    every = [2 * (each.tape.checkpoints or max(1, len(each.steps.h) // LOOKS)) for each in run.segments]
+    every = [each.tape.checkpoints or max(1, len(each.steps.h) // LOOKS) for each in run.segments]
     text = "its error is unknown: in steps of half the length "
     try:
         beside = replace(motions, x=motions.x * ASIDE, steps=halves, tau=tau)
-        other = DifferentiatedRun(beside, forwards=run.forwards, every=every)
+        other = DifferentiatedRun(beside, forwards=run.forwards, every=[2 * each for each in every])
     except MotionError as stopped:
         return [[f"{text}{stopped}"]]
     size, difference = np.zeros((2, motions.many, motions.problem.size))
-    for whole, half in zip(run.segments, other.segments, strict=True):
-        (steps, rows), (doubled, others) = run.states(whole), other.states(half)
-        here, there = np.intersect1d(2 * steps, doubled, assume_unique=True, return_indices=True)[1:]
+    for whole, half, steps in zip(run.segments, other.segments, every, strict=True):
+        rows, others = run.states(whole), other.states(half)
+        same = np.append(rows[: -1 : 1 if whole.tape.checkpoints else steps], rows[-1:], axis=0)
         size = np.maximum(size, np.abs(rows).max(axis=0).T)
-        difference = np.maximum(difference, np.abs(others[there] - rows[here]).max(axis=0).T)
+        difference = np.maximum(difference, np.abs(others - same).max(axis=0).T)
     scale = state_kinds(motions.problem).scale(size)
     allowed = options.absolute + options.relative * scale
     relative = np.divide(difference, scale, out=np.zeros_like(scale), where=difference != 0.0)

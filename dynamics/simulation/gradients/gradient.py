@@ -95,13 +95,11 @@ def gradient(
 
     Parameters
     ----------
-    model : System, OdeSystem, Mechanism or Scene
-        What moves.
+    model, q, qd, t_end
+        As for `simulate`.
     loss : callable, optional
         (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node or a number; of an OdeSystem
         (x, t) or (x, t, p). None for a running loss alone.
-    q, qd, t_end
-        As for `simulate`.
     method : str, optional
         A name of `dyn.METHODS`. By default that of `simulate`, "dop853", which chooses its steps; and "rk4" where `dt`
         or a row of forces a step asks for equal ones. Implicit equations and their derivatives are solved to rounding.
@@ -180,12 +178,10 @@ def gradient_many(
 
     Parameters
     ----------
-    model : System, OdeSystem, Mechanism or Scene
-        What moves.
+    model, loss, t_end, method, running, wrt, **options
+        As for `gradient`.
     q, qd : array_like
         The starts, (N, nq) and (N, n), or (nq,) and (n,) for all; of an OdeSystem q is the state, and qd None.
-    loss, t_end, method, running, wrt, **options
-        As for `gradient`.
     tau : float, array_like or callable
         Applied force [N m or N]: constant, (n,) or (N, n); a row a step, (N, steps, n); or a controller in closed form.
     parameters : mapping, optional

@@ -18,7 +18,7 @@ from cgraph.extend import Builder, topological
 from ...equations.state_equation import FORMS, StateInputs, state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Problem, derive, quantity
-from ...systems.arguments import Parameters, call_user_function
+from ...systems.arguments import TIME, Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System
@@ -201,7 +201,6 @@ class Differentiation:
     """A run, its losses and what to differentiate by; a call makes its motions from starts.
 
     losses: of the end, and of each step.  many: N motions, else one, whose arguments have no axis N.
-    Raises TypeError or ValueError naming the argument, as a call does.
     """
 
     def __init__(
@@ -304,7 +303,8 @@ def _with_loss_parameters(own: Equations, parameters: object, loss: Loss | None,
     new = [name for name in parameters if name not in own.parameters] if isinstance(parameters, Mapping) else []
     if not new or not all([isinstance(name, str) for name in new]):
         return own
-    p, t, system = Parameters([*own.parameters, *new]), cg.variable("t"), own.system
+    p, t = Parameters([*own.parameters, *new]), cg.variable(TIME)
+    system, ode = own.system, own.ode
     state = [cg.variables(list(own.coordinates))] if system is None else [system.q, system.qd]
     force = [] if system is None else [list(system.tau)]
     called = [("loss", loss, state), ("running", running, [*state, *force])]
@@ -313,7 +313,6 @@ def _with_loss_parameters(own: Equations, parameters: object, loss: Loss | None,
     extended = dict(own.parameters) | {name: 0.0 for name in new if name in used}
     if system is not None:
         return system.changed(parameters=extended)
-    ode = own.ode
     assert ode is not None
     return OdeSystem(lambda x, t: ode.rates, ode.states, extended)
 
