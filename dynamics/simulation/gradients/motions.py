@@ -228,8 +228,8 @@ class Differentiation:
         rows = rows if rows is not None and rows.ndim == 2 + many else None
         if method is None:
             method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
-        plain = all([type(each) in _PLAIN for each in (method, *options.values())])
-        settings = (_options if plain else _options.__wrapped__)(method, *options.items()).over(t0, t_end, None)
+        plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
+        settings = (_options if plain else _options.__wrapped__)(t_end, method, t0, *options.items())
         if rows is not None:
             _require_rows(rows, len(state_inputs(own).applied), settings, many=many, watched=bool(self._events))
         self._rows, self._options = rows if many or rows is None else rows[None], settings
@@ -346,5 +346,5 @@ def _by_displacements(system: System) -> Graph:
 
 
 @memo(OPTIONS_KEPT)
-def _options(method: str, *options: tuple[str, Any]) -> RunOptions:
-    return RunOptions.of(method, dict(options), without=NOT_TAKEN)
+def _options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
+    return RunOptions.of(method, dict(options), t0, t_end, without=NOT_TAKEN)
