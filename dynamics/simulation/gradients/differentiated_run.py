@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Array, Tape, run_passes
+from cgraph._shared import Array, Tape, kept_by_first, run_passes
 from cgraph.extend import Runner
 
 from ..events.event import WatchedEvent
@@ -61,8 +62,16 @@ class DifferentiatedRun:
         motions = self.motions
         wrt = [TORQUE] if TORQUE in motions.wrt else []
         wrt += (["p", "c"] if motions.by_parameters else []) + (["t", "h"] if motions.events else [])
-        made = motions.equations, motions.options.integrator, tuple(wrt), motions.running, motions.options.backend
-        self.programs = motion_programs(*made, each_step=motions.each_step, forwards=forwards, many=motions.many > 1)
+        self.programs = motion_programs(
+            motions.equations,
+            motions.options.integrator,
+            tuple(wrt),
+            motions.running,
+            motions.options.backend,
+            each_step=motions.each_step,
+            forwards=forwards,
+            many=motions.many > 1,
+        )
         self.segments: list[Segment] = []
         begin, x = float(motions.steps[0].t[0]), motions.x
         for stretch, kept in zip(motions.steps, every or itertools.repeat(0), strict=False):
@@ -71,9 +80,14 @@ class DifferentiatedRun:
             begin = float(segment.steps.t[-1])
             x = segment.x if segment.reset is None else _outputs(segment.reset, motions.point(segment.x, begin))
         self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
-        self.loss, self.checkpoints = np.zeros(motions.many), max([each.tape.checkpoints for each in self.segments])
+        self.loss = np.zeros(motions.many)
         if motions.running is not None:
             self.loss = sum([each.tape.value(LOSS)[0] for each in self.segments], self.loss)
+
+    @property
+    def checkpoints(self) -> int:
+        """Steps between two states that were kept; 0 where all were."""
+        return max([each.tape.checkpoints for each in self.segments])
 
     def _segment(self, steps: Stretch, x: Array, every: int) -> Segment:
         """Run steps from the state x on."""
@@ -164,10 +178,7 @@ class DifferentiatedRun:
         m, motions = len(self.x), self.motions
         for k, segment in reversed(list(enumerate(self.segments))):
             steps, end, later = segment.steps, segment.steps.t[-1], 0.0
-            if segment.reset is not None:
-                before = _outputs(pullback(segment.reset), np.concatenate([motions.point(segment.x, end), bars[:m]]))
-                before[m:] += bars[m:]
-                bars = before
+            bars = self._cotangents_at(segment.reset, segment.x, end, bars)
             if steps.event:
                 g = self._slopes(steps.event, segment.x, end)
                 # lambda with h_bar = x_bar dx/dh + t_bar + lambda (dg/dx dx/dh + dg/dt) = 0
@@ -199,22 +210,59 @@ class DifferentiatedRun:
         memory, (_, _, rows) = tape.derivative_memory({"x": seed}, 1), next(tape.records(backwards=True))
         return float(run_passes(derivative, memory, 1, 1, rows[-1:, : derivative.program.feed_width])[0, 1, 0])
 
-    def tangents(self, dots: Array) -> tuple[Array, Array]:
-        """States (steps + 1, m) of a motion without events, and tangents (.., m, k), from those of start, t, inputs."""
-        (segment,), m, many = self.segments, len(self.x), dots.shape[1]
-        tape, start = segment.tape, segment.start
-        vectors = {"x": dots[:m], **self.motions.equations.registers(dots[m + 1 :])}
+    def tangents(self, dots: Array) -> tuple[Array, Array, Array, Array]:
+        """Rows of one motion, t (T,) and q with qd (T, m), and the tangents of both, (T, k) and (T, m, k).
+
+        dots: tangents (m + 1 + .., k) of the start, of t and of inputs, along k directions.
+        """
+        m, motions = len(self.x), self.motions
+        parts = []
+        for segment in self.segments:
+            steps, end = segment.steps, float(segment.steps.t[-1])
+            lengths = steps.by_h[:, None] * dots[m] if motions.events else np.empty((0, 0))
+            times, moved = steps.by_t[:, None] * dots[m], dots
+            if steps.event:  # the last column: the length of the last step alone
+                moved, lengths = (np.pad(each, ((0, 0), (0, 1))) for each in (dots, lengths))
+                lengths[-1], lengths[-1, -1] = 0.0, 1.0
+            states, tangents = self._along(segment, moved, lengths)
+            if steps.event:
+                g = self._slopes(steps.event, segment.x, end)[:, 0]
+                tangents, slope = tangents[:, :, :-1], tangents[-1, :, -1]
+                # dg = dg/dx dx + dg/dt dt + dg/dp dp at fixed h, and dh = -dg / (dg/dx dx/dh + dg/dt)
+                length = -(g @ np.concatenate([tangents[-1], times[-2:-1], dots[m + 1 :]])) / (g[:m] @ slope + g[m])
+                # dx += dx/dh dh, dt += dh
+                tangents[-1] += slope[:, None] * length
+                times[-1] = times[-2] + length
+            parts.append((steps.t, states, times, tangents))
+            dots = np.concatenate([tangents[-1], times[-1:], dots[m + 1 :]])
+            dots = self._tangents_at(segment.reset, segment.x, end, dots)
+        if self.segments[-1].reset is not None:
+            parts.append((self.t[-1:], self.x.T, dots[m : m + 1], dots[None, :m]))
+        t, x, t_dot, x_dot = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return t, x, t_dot, x_dot
+
+    def _along(self, segment: Segment, dots: Array, lengths: Array) -> tuple[Array, Array]:
+        """States (steps + 1, m), and tangents (steps + 1, m, k), from those of start, t and inputs.
+
+        lengths: (steps, k), tangents of the lengths of the steps; none where these are constants.
+        """
+        tape, start, m, many = segment.tape, segment.start, len(self.x), dots.shape[1]
+        vectors = {"x": dots[:m], "t": dots[m : m + 1], **self.motions.equations.registers(dots[m + 1 :])}
         if start is not None:
             memory = start.derivative_memory(vectors, many)
             _run_all(start.of.derivative, memory, next(start.records(backwards=False)).kept)
             found, failed = start.vectors(memory)
             self._require_solved(failed)
             vectors |= found
-        push, memory = tape.of.derivative, tape.derivative_memory(vectors, many)
-        states, tangents = [segment.begin.T], [push.read(memory, tape.of.linear.vectors["x"]).copy()[None]]
-        for *_, rows in tape.records(backwards=False):
+        push, names, memory = tape.of.derivative, tape.of.linear.vectors, tape.derivative_memory(vectors, many)
+        states, tangents = [segment.begin.T], [push.read(memory, names["x"]).copy()[None]]
+        changes = set((np.flatnonzero((np.diff(lengths, axis=0) != 0.0).any(axis=1)) + 1).tolist())
+        for first, last, rows in tape.records(backwards=False):
             states.append(rows[:, -m:, 0])
-            tangents.append(_run_all(push, memory, rows))
+            for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
+                if len(lengths):
+                    push.read(memory, names["h"])[...] = lengths[begin]
+                tangents.append(_run_all(push, memory, rows[begin - first : end - first]))
         self._require_solved(tape.vectors(memory)[1])
         return np.concatenate(states), np.concatenate(tangents)
 
@@ -226,6 +274,21 @@ class DifferentiatedRun:
     def _slopes(self, event: WatchedEvent, x: Array, t: float) -> Array:
         """Slopes of an event's quantity by x, t and inputs, (m + 1 + .., 1)."""
         return _outputs(pullback(event.values), np.append(self.motions.point(x, t), [[1.0]], axis=0))
+
+    def _cotangents_at(self, graph: Graph | None, x: Array, t: float, bars: Array) -> Array:
+        """Cotangents (m + 1 + .., N) of x, t and inputs, from those of the state that a graph makes of them."""
+        if graph is None:
+            return bars
+        before = _outputs(pullback(graph), np.concatenate([self.motions.point(x, t), bars[: len(x)]]))
+        before[len(x) :] += bars[len(x) :]
+        return before
+
+    def _tangents_at(self, graph: Graph | None, x: Array, t: float, dots: Array) -> Array:
+        """Tangents (m + 1 + .., k) of the state that a graph makes of x, t and inputs, and of t and inputs."""
+        if graph is None:
+            return dots
+        moved = values_of(_tangent(graph), [*self.motions.point(x, t), *dots], dots.shape[1])
+        return np.concatenate([moved, dots[len(x) :]])
 
 
 def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
@@ -239,6 +302,11 @@ def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
         found[:, :, [k]] = run_passes(ready, memory, len(feed), 1, feed)
         memories[:, [k]] = memory
     return found
+
+
+@kept_by_first
+def _tangent(graph: Graph) -> Graph:
+    return cg.jvp(graph)
 
 
 def _outputs(graph: Graph, points: Array) -> Array:

@@ -283,6 +283,9 @@ class Sensitivities:
     derivatives : dict of str to ndarray
         By the names of `wrt`, those of the state x = (q, qd), of m numbers: (T, m, n) by "q", "qd" and "tau", of an
         OdeSystem (T, m, m) by "q", and (T, m) by a parameter. By "q" they are as those of `MotionGradient`.
+    times : dict of str to ndarray
+        Those of `t`, (T, n), (T, m) or (T,): 0 but where an event is, and at equal steps after it. What a row has at a
+        fixed time is `derivatives` less the rate of the state times this.
 
     Examples
     --------
@@ -297,6 +300,7 @@ class Sensitivities:
     q: Array
     qd: Array
     derivatives: dict[str, Array]
+    times: dict[str, Array]
 
     def __getitem__(self, name: str) -> Array:
         """The derivatives by one of `wrt`. Raises KeyError for another name."""
@@ -313,13 +317,13 @@ def sensitivities(
     wrt: str | Iterable[str] | None = None,
     tau: Constant | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
+    events: Event | Iterable[Event] = (),
     **options: Unpack[Options],
 ) -> Sensitivities:
     """A motion and the derivatives of all its states, by forward mode through every step.
 
     The derivatives are those of the numbers that the method computes, exact to rounding; steps that are chosen by error
-    count as constants. Their cost grows with the number of columns; `gradient` gives one loss by any number of inputs,
-    and goes through events.
+    count as constants. Their cost grows with the number of columns; `gradient` gives one loss by any number of inputs.
 
     Parameters
     ----------
@@ -327,6 +331,8 @@ def sensitivities(
         As for `gradient`.
     tau : float, sequence or callable
         Applied force [N m or N], constant, or a controller in closed form.
+    events : Event or iterable of Event
+        As for `gradient`. Where one resets the state there are two rows, before and after.
 
     Returns
     -------
@@ -348,7 +354,7 @@ def sensitivities(
     >>> result["m"][[100, 200]].round(4).tolist()
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
-    motions = Differentiation(model, (None, None), t_end, method, tau, parameters, wrt, (), options)(q, qd)
+    motions = Differentiation(model, (None, None), t_end, method, tau, parameters, wrt, events, options)(q, qd)
     if motions.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motions.tau.shape[:-1]}: gradient takes a row a step")
     run = DifferentiatedRun(motions, forwards=True)
@@ -357,8 +363,10 @@ def sensitivities(
     # a column for each number of `wrt`: the transpose of how cotangents of it are made of those of x, t and inputs
     units = np.eye(motions.problem.size + 1 + len(motions.inputs))
     by = {name: np.atleast_2d(rows) for name, rows in motions.of([0] * len(units)).by_names(units).items()}
-    x, x_dot = run.tangents(np.concatenate([*by.values()]).T)
-    parts = np.split(x_dot, np.cumsum([len(rows) for rows in by.values()])[:-1], axis=2)
-    derivatives, nq = dict(zip(by, parts, strict=True)), motions.problem.nq
-    derivatives |= {name: derivatives[name][..., 0] for name in by if name in motions.equations.names}
-    return Sensitivities(run.t, x[:, :nq], x[:, nq:], derivatives)
+    t, x, t_dot, x_dot = run.tangents(np.concatenate([*by.values()]).T)
+    ends, nq = np.cumsum([len(rows) for rows in by.values()]), motions.problem.nq
+    columns: dict[str, Any] = {name: slice(end - len(by[name]), end) for name, end in zip(by, ends, strict=True)}
+    columns |= {name: end - 1 for name, end in zip(by, ends, strict=True) if name in motions.equations.names}
+    derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
+    times = {name: t_dot[:, place] for name, place in columns.items()}
+    return Sensitivities(t, x[:, :nq], x[:, nq:], derivatives, times)

@@ -15,7 +15,7 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import TURNS, Along, Array, Passes, adjoint, kept_by_first, memo, tangent
-from cgraph.extend import STATEMENTS, Builder, Call, Program, Statement, folded, topological
+from cgraph.extend import STATEMENTS, Builder, Call, Map, Program, Statement, folded, topological
 
 from ...equations.substitute import substitute
 from ...integrators import Method, Problem
@@ -61,6 +61,7 @@ def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     p = cg.variables(list(names))
     numbers, changed = _apart(nodes, p, problem.rate.input_names)
     new = dict(zip(nodes, changed, strict=True))
+
     rate, projection = (
         graph and Graph([*graph.inputs, *numbers], {name: new[node] for name, node in graph.outputs.items()})
         for graph in graphs
@@ -141,8 +142,7 @@ def motion_programs(
     rules = at_start = {} if rule is None else {id(rate): (problem.size, rule)}
     if rule is not None and not many:  # calls of the rate record what the pullback shares with it
         shared, pulled = sharing(rate, rule)
-        # where nothing is shared, the rate's own pullback rounds less
-        rules = rules | {id(shared): (problem.size, pulled)} if pulled.shared else {}
+        rules = rules | {id(shared): (problem.size, pulled)} if pulled.shared else {}  # else the rate's own is exact
         for k, each in enumerate(body if rules else ()):
             if isinstance(each, Call) and each.graph is rate:
                 lengths[f"shared{k}"] = len(pulled.shared)
@@ -150,7 +150,11 @@ def motion_programs(
     make = partial(Passes, constant=(*made.fixed, "evaluations", "nonfinite"), turns=0 if forwards else TURNS)
     fed = ("t", "h", "tau") if each_step else ("t", "h")
     step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, wrt)
-    linear = tangent(step, ["x"]) if forwards else adjoint(step, carried, rules)
+    if forwards:
+        then = [Map(_LATER, ("t:dot", "h:dot"), ("t:dot",))] if {"t", "h"} <= set(wrt) else []
+        linear = tangent(step, ["x"], then)
+    else:
+        linear = adjoint(step, carried, rules)
     first = None
     if begin := _separate([*normalizing(problem, TIME), *made.start]):
         read = [name for name in (*step.handed, *step.constants) if name not in INPUTS]

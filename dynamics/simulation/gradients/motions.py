@@ -267,7 +267,7 @@ class Differentiation:
 
     def _names(self, inputs: StateInputs) -> tuple[str, ...]:
         """Names to differentiate by: by default the start, and the applied force where it is numbers."""
-        usual = [START] if not inputs.applied else [START, VELOCITY] if self._closed else [START, VELOCITY, TORQUE]
+        usual = [START, VELOCITY, TORQUE][: 3 - self._closed] if inputs.applied else [START]
         if self._wrt is None:
             return tuple(usual)
         names = [self._wrt] if isinstance(self._wrt, str) else require_sequence("wrt", self._wrt, "names")

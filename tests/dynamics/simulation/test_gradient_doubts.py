@@ -167,7 +167,7 @@ def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate() -> Non
 def test_ctrl_c_is_a_keyboard_interrupt(derive: Any, method: str, ctrl_c: Any) -> None:
     loss = [] if derive is dyn.sensitivities else [end]
     start = [[1.0]] if derive is dyn.gradient_many else [1.0]
-    events = {"events": dyn.Event("late", lambda q, qd, t: t - 500.0)} if derive is dyn.gradient else {}
+    events = {} if derive is dyn.gradient_many else {"events": dyn.Event("late", lambda q, qd, t: t - 500.0)}
     ctrl_c(0.3)
     with raises(KeyboardInterrupt):
         derive(SPRING, *loss, start, [0.0], 1e3 if method == "rk4" else 1e5, method, backend="python", **events)
