@@ -105,6 +105,10 @@ class Run(HoldsNodes):
         """Numbers of the inputs of the state equation besides states and t."""
         return other_inputs(self.model, self.applied.constant, self._values)
 
+    def equations(self, numbers: Mapping[str, float]) -> Problem:
+        """The equations in the states that are stepped, with these numbers built in."""
+        return in_form(derive(self.model, numbers), self._form)
+
     @cached_property
     def problem(self) -> Problem:
         """The equations with numbers built in, in q and qd."""

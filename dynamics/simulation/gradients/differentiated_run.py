@@ -73,16 +73,22 @@ class DifferentiatedRun:
             many=motions.many > 1,
         )
         self.segments: list[Segment] = []
-        begin, x = float(motions.steps[0].t[0]), motions.x
+        begin = float(motions.steps[0].t[0])
+        x = self._state(motions.equations.start, motions.x, begin)
         for stretch, kept in zip(motions.steps, every or itertools.repeat(0), strict=False):
             segment = self._segment(stretch.beginning_at(begin), x, kept)
             self.segments.append(segment)
             begin = float(segment.steps.t[-1])
-            x = segment.x if segment.reset is None else _outputs(segment.reset, motions.point(segment.x, begin))
+            x = self._state(segment.reset, segment.x, begin)
         self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
         self.loss = np.zeros(motions.many)
         if motions.running is not None:
             self.loss = sum([each.tape.value(LOSS)[0] for each in self.segments], self.loss)
+
+    @property
+    def end(self) -> Array:
+        """The end of the motions in q and qd, (m, N)."""
+        return self._state(self.motions.equations.end, self.x, float(self.t[-1]))
 
     @property
     def checkpoints(self) -> int:
@@ -202,7 +208,7 @@ class DifferentiatedRun:
             registers = motions.equations.registers(np.zeros_like(bars[m + 1 :]))
             inputs = np.concatenate([vectors.get(name, zero) for name, zero in registers.items()])
             bars = np.concatenate([vectors["x"], t_bar, bars[m + 1 :] + inputs])
-        return bars, rows
+        return self._cotangents_at(motions.equations.start, motions.x, float(self.t[0]), bars), rows
 
     def _by_last_length(self, segment: Segment, seed: Array) -> float:
         """Cotangent of h of the last step of one motion, from that of x (m, 1) after it: t and h are what varies."""
@@ -216,6 +222,7 @@ class DifferentiatedRun:
         dots: tangents (m + 1 + .., k) of the start, of t and of inputs, along k directions.
         """
         m, motions = len(self.x), self.motions
+        dots = self._tangents_at(motions.equations.start, motions.x, float(self.t[0]), dots)
         parts = []
         for segment in self.segments:
             steps, end = segment.steps, float(segment.steps.t[-1])
@@ -239,6 +246,11 @@ class DifferentiatedRun:
         if self.segments[-1].reset is not None:
             parts.append((self.t[-1:], self.x.T, dots[m : m + 1], dots[None, :m]))
         t, x, t_dot, x_dot = (np.concatenate(column) for column in zip(*parts, strict=True))
+        if (graph := motions.equations.end) is not None:
+            points = [*x.T[:, :, None], t[:, None], *motions.inputs[:, :, None]]
+            moving = [*points, *x_dot.swapaxes(0, 1), t_dot, *dots[m + 1 :]]
+            x = values_of(graph, points, len(t), 1)[:, :, 0].T
+            x_dot = values_of(_tangent(graph), moving, *t_dot.shape).swapaxes(0, 1)
         return t, x, t_dot, x_dot
 
     def _along(self, segment: Segment, dots: Array, lengths: Array) -> tuple[Array, Array]:
@@ -289,6 +301,10 @@ class DifferentiatedRun:
             return dots
         moved = values_of(_tangent(graph), [*self.motions.point(x, t), *dots], dots.shape[1])
         return np.concatenate([moved, dots[len(x) :]])
+
+    def _state(self, graph: Graph | None, x: Array, t: float) -> Array:
+        """The states (m, N) that a graph over the states, t and parameters makes of some; the same without a graph."""
+        return x if graph is None else _outputs(graph, self.motions.point(x, t))
 
 
 def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:

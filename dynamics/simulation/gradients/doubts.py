@@ -1,4 +1,4 @@
-"""Doubts: what speaks against motions that are differentiated: their steps and their losses."""
+"""Doubts: what speaks against motions that are differentiated: their steps, their momenta, and their losses."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..estimates.error_estimate import LAWLESS
 from ..outcome import MotionError
 from ..steps.state_sizes import off_by
 from ..steps.step_program import state_kinds
+from ..unreached_momenta import unreached_momenta
 from .differentiated_run import DifferentiatedRun
 
 LOOKS = 64  # at least, if there are so many steps, at which two motions are compared
@@ -22,7 +23,11 @@ ASIDE = 1.0 + 2.0**-52  # by which the other motion starts aside: what a roundin
 
 def doubts(run: DifferentiatedRun) -> list[list[str]]:
     """A sentence each, of every motion, which has an end."""
-    return [[*run.motions.said, *texts] for texts in _half_steps(run)]
+    said = [[*run.motions.said] for _ in range(run.motions.many)]
+    for sentences in (_other_momenta(run), _half_steps(run)):
+        for texts, more in zip(said, sentences, strict=False):  # no sentences: of no motion
+            texts += more
+    return said
 
 
 def loss_doubts(
@@ -42,12 +47,23 @@ def loss_doubts(
     return said
 
 
+def _other_momenta(run: DifferentiatedRun) -> list[list[str]]:
+    """Doubts about velocities of motions in momenta."""
+    motions, problem = run.motions, run.motions.problem
+    if problem.missing is None:
+        return []
+    kept = [(segment.steps.t, *run.states(segment)) for segment in run.segments]
+    t, rows = np.concatenate([t[steps] for t, steps, _ in kept]), np.concatenate([x for *_, x in kept])
+    starts = zip(motions.x.T, np.moveaxis(rows, -1, 0), motions.inputs.T, strict=True)
+    return [unreached_momenta(problem, t, x, p, start=(float(t[0]), start, x[0])) for start, x, p in starts]
+
+
 def _chaos(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
     """Whether the error at the start of a motion may change the loss by more than its own size does."""
     motions, options = run.motions, run.motions.options
     error = min(options.relative, LOOSE_TOLERANCE) if options.adaptive else ASIDE - 1.0
     with np.errstate(all="ignore"):
-        change = error * (np.abs(start) * np.maximum(np.abs(motions.x), np.abs(run.x))).sum(axis=0)
+        change = error * (np.abs(start) * np.maximum(np.abs(motions.x), np.abs(run.end))).sum(axis=0)
         slope, loss = np.abs(end), np.abs(run.loss)
         if not (change > (slope * np.abs(run.x)).sum(axis=0) + loss).any():  # the end is enough
             return []
@@ -65,9 +81,8 @@ def _chaos(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
 def _half_steps(run: DifferentiatedRun) -> list[list[str]]:
     """Errors of motions by equal steps, beside steps of half the length with the same forces, that are too large."""
     motions, options = run.motions, run.motions.options
-    said: list[list[str]] = [[] for _ in range(motions.many)]
     if not options.estimated:
-        return said
+        return []
     halves = tuple([each.steps.half_steps() for each in run.segments])
     tau = np.repeat(motions.tau, 2, axis=0) if motions.each_step else motions.tau
     every = [each.tape.checkpoints or max(1, len(each.steps.h) // LOOKS) for each in run.segments]
@@ -89,6 +104,7 @@ def _half_steps(run: DifferentiatedRun) -> list[list[str]]:
     # with an error C h^p the two differ by (1 - 2^-p) of it
     error = np.where(relative > LAWLESS, relative, relative / (1.0 - 0.5**options.integrator.order))
     longest = float(np.abs(run.segments[0].steps.h[0]))
+    said: list[list[str]] = [[] for _ in size]
     for k in np.flatnonzero(np.isfinite(size).all(axis=1)).tolist():  # of the motions that have an end
         if not np.isfinite(difference[k]).all():
             said[k].append(f"{text}the motion {other.stopped(k, other.segments[-1])}")

@@ -118,7 +118,7 @@ def gradient(
         by a step of its own length, so that `value` may differ from that of `simulate` by the error of a step. Not with
         a row of forces a step.
     **options
-        Those of `dyn.Options` but `max_steps`, `dense_output`, `form`, `fma`, `progress`. The error of equal steps is
+        Those of `dyn.Options` but `max_steps`, `dense_output`, `fma` and `progress`. The error of equal steps is
         estimated by a motion in steps of half the length, which takes half as long again.
 
     Returns
@@ -151,7 +151,7 @@ def gradient(
     run, values, slopes, said = _gradients(motions)
     for text in said[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    nq, x = motions.problem.nq, run.x[:, 0]
+    nq, x = motions.problem.nq, run.end[:, 0]
     gradients = {name: each[..., 0] if each.ndim > 1 else float(each[0]) for name, each in slopes.items()}
     return MotionGradient(float(values[0]), gradients, run.t, x[:nq], x[nq:], run.checkpoints)
 
@@ -227,8 +227,8 @@ def gradient_many(
                 parts += [range(k, k + 1) for k in part]
             continue
         checkpoints = max(checkpoints, run.checkpoints)
-        arrived = np.asarray(np.isfinite(run.x).all(axis=0))
-        results = [(values, losses_of_part), (end, run.x), *[(gradients[name], slopes[name]) for name in slopes]]
+        arrived = np.asarray(np.isfinite(run.end).all(axis=0))
+        results = [(values, losses_of_part), (end, run.end), *[(gradients[name], slopes[name]) for name in slopes]]
         for table, array in results:
             table[part.start : part.stop][arrived] = np.moveaxis(array, -1, 0)[arrived]
         for k, whole, texts in zip(part, arrived, sentences, strict=True):

@@ -27,6 +27,7 @@ from .rate_pullback import RatePullback, rate_pullback, sharing
 
 PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
 LOSS = "loss"  # register: the running loss so far
+OVER_INPUTS = ("rate", "projection", "momentum", "velocities", "missing")  # graphs of a problem over its parameters
 INPUTS = (*PARAMETERS, "t", "rtol", "atol")  # registers: what a motion has from without
 PROGRAMS_KEPT = 16  # motions whose programs stay ready for another run
 _T, _H = cg.variables("t h")
@@ -38,6 +39,7 @@ class MotionEquations:
     """A problem whose parameters are applied forces, p, and numbers c, which p alone decides.
 
     forces: how many of the parameters are applied forces.  names: of p.  numbers: p and c of p; None without c.
+    start, end: (q, qd) to a state of the steps and back, over states, t, parameters; None where they are the same.
     """
 
     problem: Problem
@@ -45,6 +47,8 @@ class MotionEquations:
     names: tuple[str, ...]
     numbers: Graph | None
     pullback: RatePullback | None
+    start: Graph | None
+    end: Graph | None
 
     def registers(self, inputs: Array) -> dict[str, Array]:
         """The registers of the parameters, of these end to end."""
@@ -56,23 +60,26 @@ class MotionEquations:
 def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     """The equations of a problem whose first `forces` parameters are applied forces."""
     names, rule = problem.parameters[forces:], rate_pullback(problem)
-    graphs = problem.rate, problem.projection
-    nodes = [node for graph in graphs if graph for node in graph.outputs.values()] + [*(rule.nodes if rule else ())]
+    rates = problem.rate, problem.projection
+    nodes = [node for graph in rates if graph for node in graph.outputs.values()] + [*(rule.nodes if rule else ())]
     p = cg.variables(list(names))
     numbers, changed = _apart(nodes, p, problem.rate.input_names)
     new = dict(zip(nodes, changed, strict=True))
 
-    rate, projection = (
-        graph and Graph([*graph.inputs, *numbers], {name: new[node] for name, node in graph.outputs.items()})
-        for graph in graphs
-    )
-    assert rate is not None
-    rule = rule and replace(rule, inputs=rate.inputs, nodes=[new[node] for node in rule.nodes])
+    def over_numbers(graph: Graph | None) -> Graph | None:
+        outputs = graph and {name: new.get(node, node) for name, node in graph.outputs.items()}
+        return graph and Graph([*graph.inputs, *numbers], outputs or {})
+
+    def whole(graph: Graph | None) -> Graph | None:
+        """States to states, whose coordinates stay and whose last numbers the graph gives."""
+        return graph and Graph(graph.inputs, {str(q.name): q for q in graph.inputs[: problem.nq]} | graph.outputs)
+
+    graphs: dict[str, Any] = {name: over_numbers(getattr(problem, name)) for name in OVER_INPUTS}
     outputs = {str(variable.name): node for variable, node in numbers.items()}
-    parameters = (*problem.parameters, *outputs)
-    made = replace(problem, parameters=parameters, rate=rate, projection=projection, multipliers=None)
+    made = replace(problem, parameters=(*problem.parameters, *outputs), multipliers=None, **graphs)
+    rule = rule and replace(rule, inputs=made.rate.inputs, nodes=[new[node] for node in rule.nodes])
     over_p = Graph(p, dict(zip(names, p, strict=True)) | outputs) if outputs else None
-    return MotionEquations(made, forces, names, over_p, rule)
+    return MotionEquations(made, forces, names, over_p, rule, whole(made.momentum), whole(made.velocities))
 
 
 def _apart(

@@ -17,7 +17,7 @@ from cgraph.extend import Builder, topological
 
 from ...equations.state_equation import FORMS, StateInputs, state_inputs
 from ...equations.states.initial_value import initial_values
-from ...integrators import Problem, derive, quantity
+from ...integrators import Problem, quantity
 from ...systems.arguments import TIME, Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
 from ...systems.ode_system import OdeSystem
@@ -29,6 +29,7 @@ from ..run import Run
 from ..run_options import METHOD, Options, RunOptions, time_span
 from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
+from ..steps.row_values import converted
 from .motion_programs import MotionEquations, motion_equations, outputs_at, pullback
 
 Loss = Callable[..., Node | float]
@@ -36,7 +37,7 @@ START, VELOCITY, TORQUE = "q", "qd", "tau"
 LOSSES_KEPT = 64  # losses whose graphs stay for another run
 OPTIONS_KEPT = 16  # options and equal steps that stay for another run
 EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
-NOT_TAKEN = "max_steps", "dense_output", "form", "fma", "progress"
+NOT_TAKEN = "max_steps", "dense_output", "fma", "progress"
 _PLAIN = (float, int, str, bool, type(None))
 
 
@@ -91,7 +92,7 @@ def _equal_stretch(t0: float, t_end: float, count: int) -> Stretch:
 class Motions:
     """N motions side by side, whose steps are the same; one alone, N = 1.
 
-    x: (m, N), where they start.  steps: none of chosen steps before they are run.
+    x: (m, N), where they start, in q and qd.  steps: none of chosen steps before they are run.
     tau: the applied forces that are inputs, (forces, N), or where they change with the steps, (steps, forces, N).
     values: of the parameters p that stay inputs, and of the numbers c, (.., N).  said: doubts, a sentence each.
     """
@@ -166,8 +167,9 @@ class Motions:
         """
         if self.steps:
             return self
-        options, x, p = self.options, self.x[:, 0], self.inputs[:, 0].tolist()
-        made = partial(stepper_of, self.problem, parameters=p, events=self.events, between=bool(self.events))
+        problem, options, p = self.problem, self.options, self.inputs[:, 0]
+        made = partial(stepper_of, problem, parameters=p.tolist(), events=self.events, between=bool(self.events))
+        x = converted(problem.momentum, options.t0, self.x[:, 0], p)
         run, recorder = made(options), Recorder(x, None, options.t0, options.direction)
         with np.errstate(all="ignore"):
             for block in run.blocks(x):
@@ -224,7 +226,7 @@ class Differentiation:
         self._many, self._closed = many, callable(tau)
         own = _with_loss_parameters(as_equations(model), parameters, *losses)
         t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
-        rows = None if callable(tau) else real_array("tau", tau)
+        form, rows = options.pop("form", FORMS[0]), None if callable(tau) else real_array("tau", tau)
         rows = rows if rows is not None and rows.ndim == 2 + many else None
         if method is None:
             method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
@@ -233,7 +235,7 @@ class Differentiation:
         if rows is not None:
             _require_rows(rows, len(state_inputs(own).applied), settings, many=many, watched=bool(self._events))
         self._rows, self._options = rows if many or rows is None else rows[None], settings
-        self._run = Run(own, settings, tau if rows is None else 0.0, self._events, FORMS[0], False, (), parameters)
+        self._run = Run(own, settings, tau if rows is None else 0.0, self._events, form, False, (), parameters)
 
     def __call__(self, q: ArrayLike, qd: ArrayLike | None) -> Motions:
         """The motions."""
@@ -245,7 +247,7 @@ class Differentiation:
         forced = rows is not None or TORQUE in wrt or not start.varied.keys().isdisjoint(names)
         forces = names if forced or any([start.bound[name] != 0.0 for name in names]) else ()
         free = {*forces, *wrt, *(self._parameters or ())}  # what a caller changes from call to call stays an input
-        derived = derive(run.model, {name: value for name, value in start.bound.items() if name not in free})
+        derived = run.equations({name: value for name, value in start.bound.items() if name not in free})
         equations, columns = motion_equations(derived, len(forces)), start.bound | start.varied
         numbers = np.empty((len(forces) + len(equations.names), count))
         for row, name in zip(numbers, [*forces, *equations.names], strict=True):

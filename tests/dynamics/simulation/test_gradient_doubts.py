@@ -38,13 +38,14 @@ def end(q: Any, qd: Any, t: Any) -> Any:
     return q[0]
 
 
+@mark.parametrize("form", ["velocity", "momentum"])
 @mark.parametrize("method", [*USUAL, *slow(*[name for name in EQUAL if name not in USUAL])])
-def test_no_equal_steps_have_wrong_slopes_in_silence(method: str) -> None:
+def test_no_equal_steps_have_wrong_slopes_in_silence(method: str, form: str) -> None:
     """A spring of any stiffness, in any unit, with torques of every step or without, alone and among others."""
     rng = np.random.default_rng(len(method))
     for _ in range(2):
         rate, unit = 10.0 ** rng.uniform(0.0, 4.0), 10.0 ** rng.uniform(-6.0, 6.0)
-        given: dict[str, Any] = {"method": method, "wrt": ["q", "tau"]}
+        given: dict[str, Any] = {"method": method, "form": form, "wrt": ["q", "tau"]}
         given["parameters"] = {"w": rate}
         given["t_end"], q, qd = 0.2, [unit], [0.0]
         equal: dict[str, Any] = {"dt": 2e-3}

@@ -16,6 +16,7 @@ from ...slow import slow
 from ..equations.test_hamiltonian import random_tree, rotor
 from ..linkages import four_bar
 from ..models import coupled_springs, driven_pendulum, magnetic, oscillator, random_arm, relativistic
+from .test_motion_gradients import BEAD, loss
 
 FORMS = ("velocity", "momentum")
 MODELS = {
@@ -139,6 +140,20 @@ def test_a_sampled_controller_sees_velocities(method: str) -> None:
     assert_same(canonical.events["brake"].t, plain.events["brake"].t)
 
 
+def test_gradients_of_a_motion_are_the_same() -> None:
+    """By the start, where p depends on q, and by a parameter that the first momentum depends on; through events."""
+    start, how = ([0.5], [0.2]), {"t_end": 1.0, "method": "dop853", "rtol": 1e-12, "backend": "python"}
+    how |= {"events": watched(1)[1:], "wrt": ["q", "qd", "m"]}
+    velocity, momentum = (dyn.gradient(BEAD, loss, *start, form=form, **how) for form in FORMS)
+    assert_same([momentum.value, *momentum.q, *momentum.qd], [velocity.value, *velocity.q, *velocity.qd])
+    forward = [dyn.sensitivities(BEAD, *start, form=form, **how) for form in FORMS]
+    for name in how["wrt"]:
+        assert_same(momentum[name], velocity[name])
+        assert_same(forward[1][name][-1], forward[0][name][-1])
+        assert_same(forward[1].times[name][-1], forward[0].times[name][-1])
+    assert_same(forward[1].qd[-1], forward[0].qd[-1])
+
+
 def test_what_the_momentum_form_has_not_is_said() -> None:
     with pytest.raises(ValueError, match="form"):
         dyn.simulate(oscillator(), [1.0], [0.0], 1.0, form="impulse")
@@ -146,8 +161,6 @@ def test_what_the_momentum_form_has_not_is_said() -> None:
     for run in (dyn.simulate, dyn.simulate_many):
         with pytest.raises(ValueError, match="first order"):
             run(first_order, [[1.0]] if run is dyn.simulate_many else [1.0], None, 1.0, t_eval=[1.0], form="momentum")
-    with pytest.raises(TypeError, match="there is no option 'form' here"):
-        dyn.sensitivities(oscillator(), [1.0], [0.0], 1.0, form="momentum")
     q, qd = nearest_state(four_bar(), [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     with pytest.raises(dyn.ConstraintError, match="holds the momenta"):
         dyn.simulate(four_bar(), q, qd, 1.0, form="momentum")
@@ -168,6 +181,15 @@ def test_velocities_that_momenta_do_not_have_are_no_silent_result(model: Any, t_
     with pytest.warns(dyn.SimulationWarning, match=f"1 of 2 trajectories has a warning: trajectory 1: .*{said}"):
         fan = dyn.simulate_many(model, [0.0], [[-2.0 if model is BOUNDED else 0.0], [0.9]], **how)
     assert [len(texts) for texts in fan.stats.warnings] == [0, len(run.stats.warnings)]
+
+
+@pytest.mark.parametrize("derive", [dyn.gradient_many, *slow(dyn.gradient, dyn.sensitivities)])
+def test_nor_are_their_derivatives(derive: Any) -> None:
+    where = [] if derive is dyn.sensitivities else [lambda q, qd, t: q[0]]
+    qd, number = ([[0.0], [0.9]], "1 of 2 motions doubtful: motion 1: ") if derive is dyn.gradient_many else ([0.9], "")
+    given = {"form": "momentum", "wrt": "q", "backend": "python", "estimate_error": False}
+    with pytest.warns(dyn.SimulationWarning, match=f"{number}the momenta of the start .*0.1.* in place of 0.9"):
+        derive(FOLDED, *where, [0.0], qd, 0.1, "euler", dt=0.1, **given)
 
 
 @pytest.mark.slow
