@@ -52,8 +52,11 @@ def _other_momenta(run: DifferentiatedRun) -> list[list[str]]:
     motions, problem = run.motions, run.motions.problem
     if problem.missing is None:
         return []
-    kept = [(segment.steps.t, *run.states(segment)) for segment in run.segments]
-    t, rows = np.concatenate([t[steps] for t, steps, _ in kept]), np.concatenate([x for *_, x in kept])
+    times, rows = [each.steps.t for each in run.segments], np.concatenate([run.states(each) for each in run.segments])
+    for k, tape in enumerate([each.tape for each in run.segments]):
+        if tape.checkpoints:
+            times[k] = times[k][[*[first for first, *_ in tape.blocks], -1]]
+    t = np.concatenate(times)
     starts = zip(motions.x.T, np.moveaxis(rows, -1, 0), motions.inputs.T, strict=True)
     return [unreached_momenta(problem, t, x, p, start=(float(t[0]), start, x[0])) for start, x, p in starts]
 
