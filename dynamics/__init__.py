@@ -101,8 +101,11 @@ if TYPE_CHECKING:
     from .simulation.ensembles.ensemble import Ensemble as Ensemble
     from .simulation.ensembles.simulate_many import simulate_many as simulate_many
     from .simulation.events.event import Event as Event
-    from .simulation.gradients.gradient import gradient as gradient, gradient_many as gradient_many
-    from .simulation.gradients.sensitivities import sensitivities as sensitivities
+    from .simulation.gradients.gradient import (
+        gradient as gradient,
+        gradient_many as gradient_many,
+        sensitivities as sensitivities,
+    )
     from .simulation.outcome import MotionError as MotionError
     from .simulation.run import Run as Run
     from .simulation.run_options import Options as Options

@@ -47,7 +47,7 @@ from .trajectory import SimulationWarning, Trajectory
 if TYPE_CHECKING:
     from .ensembles.task import Workers
 
-Values: TypeAlias = Mapping[str, float] | None  # {name of a parameter: value}
+Values: TypeAlias = Mapping[str, Any] | None  # {name of a parameter: value}
 KEPT = 16  # runs with other parameters, and tasks, that a run keeps
 
 
@@ -85,12 +85,25 @@ class Run(HoldsNodes):
     _parameters: Values = None
 
     @cached_property
+    def _values(self) -> Values:
+        if not self._varied:
+            return self._parameters
+        own = as_equations(self._model).parameters  # also those that stay open, so that a controller knows its own
+        return {name: own.get(name, 0.0) for name in self._varied} | dict(self._parameters or {})
+
+    @cached_property
+    def applied(self) -> Applied:
+        """The equations of the model, and the force that is applied to it."""
+        return with_applied(self._model, self._tau, self._values)
+
+    def equations(self, numbers: Mapping[str, float]) -> Problem:
+        """The equations in the states that are stepped, with these numbers built in."""
+        return in_form(derive(self.applied.model, numbers), self._form)
+
+    @cached_property
     def _equations(self) -> RunEquations:
-        own, values = as_equations(self._model).parameters, self._parameters
-        if self._varied:  # also those that stay open, so that a controller knows its own
-            values = {name: own.get(name, 0.0) for name in self._varied} | dict(values or {})
-        applied = with_applied(self._model, self._tau, values)
-        numbers = other_inputs(applied.model, applied.constant, values)
+        applied = self.applied
+        numbers = other_inputs(applied.model, applied.constant, self._values)
         stay = {*self._varied} if applied.controller is None else {*state_inputs(applied.model).applied}
         problem = derive(applied.model, {name: value for name, value in numbers.items() if name not in stay})
         stepped = in_form(problem, self._form)

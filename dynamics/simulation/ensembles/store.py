@@ -157,6 +157,7 @@ class Store:
 def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json]:
     """What makes a sweep of states x (N, m) with parameters p (N, ..): equations, options, and by which versions."""
     program, options, watched = task.program, task.options, task.events.events if task.events else ()
+    names = [field.name for field in fields(options) if field.init]
     model = [problem.rate, problem.velocities, program.normalization]
     events = [graph for event in watched for graph in (event.values, event.reset)]
     known = {
@@ -164,7 +165,7 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "cgraph": cg.__version__,
         "llvmlite": [each.version for each in distributions(name="llvmlite")],
         "machine": platform.machine(),
-        **{field.name: getattr(options, field.name) for field in fields(options) if field.init and field.name != "progress"},
+        **{name: getattr(options, name) for name in names if name != "progress"},
         "rtol": options.relative,
         "atol": np.asarray(options.absolute).tolist(),
         "t_eval": _digest(options.row_times.tobytes()),

@@ -19,12 +19,11 @@ from cgraph import Graph
 from cgraph._shared import Array, Tape, kept_by_first, run_passes
 from cgraph.extend import Runner
 
-from ..events.event import WatchedEvent, event_program
+from ..events.event import WatchedEvent
 from ..outcome import MotionError
 from ..stepper import nonfinite, unsolved
-from ..steps.dense_output import Indices
 from ..steps.row_values import values_of
-from .motion_programs import LOSS, motion_programs
+from .motion_programs import LOSS, motion_programs, pullback
 from .motions import TORQUE, Motions, Stretch
 
 MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
@@ -35,10 +34,7 @@ MOST_TURNS = 20  # of Newton's method for the length of a step that arrives at a
 
 @dataclass(eq=False)
 class Segment:
-    """Steps that were run.  begin: the state (m, N) before the first one.  x: the state after the last one.
-
-    start: tape of what is before the first step, if anything.  tape: that of the steps.
-    """
+    """Steps that were run: tapes of what is before the first one, if anything, and of them; (m, N) before and after."""
 
     steps: Stretch
     start: Tape | None
@@ -46,30 +42,31 @@ class Segment:
     begin: Array
     x: Array
 
+    @property
+    def reset(self) -> Graph | None:
+        """Reset of the state at the end."""
+        return self.steps.event.reset if self.steps.event else None
+
 
 class DifferentiatedRun:
     """N motions from their starts to their ends, once; then along them. With events N = 1.
 
-    forwards: tangents are to be pushed on, else cotangents pulled back.  running: the loss of a step, a graph.
+    forwards: tangents are to be pushed on, else cotangents pulled back.
     every: keep the states after every so many steps alone, of each segment; nothing goes along the motion.
-    x, t: the end of the motion, (m, N) in states of its steps, and all times.  loss: the running one, (N,).
-    Raises MotionError for a motion alone that does not stay finite, or whose equations are not solved; one side by side
-    with others has an end that is not finite.
+    x, t: the end, (m, N), not finite of one among others that failed, and all times.  loss: the running one, (N,).
+    checkpoints: steps between two states that were kept; 0 where all were.
     """
 
-    def __init__(
-        self, motions: Motions, running: Graph | None = None, *, forwards: bool = False, every: Sequence[int] = ()
-    ) -> None:
-        self.motions = motions = motions.with_steps()
-        self.running, self.forwards = running, forwards
-        watched = event_program(motions.problem, motions.events).events if motions.events else ()
-        self.events = {event.name: event for event in watched}
-        by = (["p", "c"] if motions.by_parameters else []) + (["t", "h"] if motions.events else [])
+    def __init__(self, motions: Motions, *, forwards: bool = False, every: Sequence[int] = ()) -> None:
+        self.motions, self.forwards = motions.with_steps(), forwards
+        motions = self.motions
+        wrt = [TORQUE] if TORQUE in motions.wrt else []
+        wrt += (["p", "c"] if motions.by_parameters else []) + (["t", "h"] if motions.events else [])
         self.programs = motion_programs(
             motions.equations,
             motions.options.integrator,
-            (*[name for name in motions.wrt if name == TORQUE], *by),
-            running,
+            tuple(wrt),
+            motions.running,
             motions.options.backend,
             each_step=motions.each_step,
             forwards=forwards,
@@ -79,12 +76,13 @@ class DifferentiatedRun:
         begin = float(motions.steps[0].t[0])
         x = self._state(motions.equations.start, motions.x, begin)
         for stretch, kept in zip(motions.steps, every or itertools.repeat(0), strict=False):
-            self.segments.append(self._segment(stretch.beginning_at(begin), x, kept))
-            begin = float(self.segments[-1].steps.t[-1])
-            x = self._state(self._reset(stretch), self.segments[-1].x, begin)
+            segment = self._segment(stretch.beginning_at(begin), x, kept)
+            self.segments.append(segment)
+            begin = float(segment.steps.t[-1])
+            x = self._state(segment.reset, segment.x, begin)
         self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
         self.loss = np.zeros(motions.many)
-        if running is not None:
+        if motions.running is not None:
             self.loss = sum([each.tape.value(LOSS)[0] for each in self.segments], self.loss)
 
     @property
@@ -97,40 +95,34 @@ class DifferentiatedRun:
         """Steps between two states that were kept; 0 where all were."""
         return max([each.tape.checkpoints for each in self.segments])
 
-    def _reset(self, steps: Stretch) -> Graph | None:
-        """Reset of the state at the end of a segment."""
-        return self.events[steps.event].reset if steps.event else None
-
     def _segment(self, steps: Stretch, x: Array, every: int) -> Segment:
         """Run steps from the state x on."""
         motions, many, count = self.motions, self.motions.many, len(steps.h)
-        start_program, step_program, failed = self.programs
+        before, step, failed = self.programs
         tau = motions.tau[0] if motions.each_step else motions.tau
         values = motions.equations.registers(np.concatenate([tau, motions.values])) | {"t": steps.t[:1], "x": x}
         if motions.options.adaptive and not failed:  # rtol = 0: what is iterated is solved to rounding
             tolerances = {"rtol": motions.options.relative, "atol": motions.options.absolute}
             values |= {name: np.asarray(value) for name, value in tolerances.items()}
         start = None
-        if start_program is not None:
-            start = Tape(start_program, values, lambda first, last: np.empty((last - first, 0, 1)), many)
+        if before is not None:
+            start = Tape(before, values, lambda first, last: np.empty((last - first, 0, 1)), many)
             start.run(0, 1)
-            values |= {name: start.value(name) for name in start_program.passes.handed}
+            values |= {name: start.value(name) for name in before.passes.handed}
 
         def fed(first: int, last: int) -> Array:
             """Inputs of the steps first .. last - 1, (.., width, N), or one for all motions without own forces."""
-            part = slice(first, last)
+            rows = np.stack([steps.t[first:last], steps.h[first:last]], axis=1)[:, :, None]
             if not motions.each_step:
-                return np.stack([steps.t[part], steps.h[part]], axis=1)[:, :, None]
-            rows = np.empty((last - first, 2 + motions.equations.forces, many))
-            rows[:, 0].T[...], rows[:, 1].T[...], rows[:, 2:] = steps.t[part], steps.h[part], motions.tau[part]
-            return rows
+                return rows
+            return np.concatenate([np.broadcast_to(rows, (*rows.shape[:2], many)), motions.tau[first:last]], axis=1)
 
-        fits = every > 0 or 8 * step_program.forward.program.width * count * many <= MOST_RECORDED
-        tape = Tape(step_program, values, fed, many, 0 if fits else math.ceil(math.sqrt(count)), every or 1)
+        fits = every > 0 or 8 * step.forward.program.width * count * many <= MOST_RECORDED
+        tape = Tape(step, values, fed, many, 0 if fits else math.ceil(math.sqrt(count)), every or 1)
         segment = Segment(steps, start, tape, tape.value("x"), x)
         tape.run(0, count - bool(steps.event))
         if steps.event:
-            self._arrive(segment, self.events[steps.event])
+            self._arrive(segment, steps.event)
         segment.x = tape.value("x")
         bad = ~np.isfinite(segment.x).all(axis=0)
         if failed:
@@ -149,7 +141,7 @@ class DifferentiatedRun:
             run_passes(tape.of.forward, memory, 1, 1, tape.feed(count - 1, count))
             x = tape.value("x", memory)
             point = self.motions.point(x, t[-1])
-            slopes, x_dot = self._gradient_at(event.name, x, t[-1]), _outputs(self.motions.problem.rate, point)
+            slopes, x_dot = self._slopes(event, x, t[-1]), _outputs(self.motions.problem.rate, point)
             # Newton's method: h -= g / (dg/dx xdot + dg/dt)
             change = float((_outputs(event.values, point) / (slopes[: len(x)].T @ x_dot + slopes[len(x)]))[0, 0])
             if not abs(change) < last:
@@ -163,13 +155,13 @@ class DifferentiatedRun:
 
     def stopped(self, k: int, segment: Segment) -> str:
         """Place where motion k went wrong in a segment: the first step after which it has, in words."""
-        motions, tape, m = self.motions, segment.tape, self.motions.problem.size
-        memory, before, names = tape.first.copy(), segment.begin[:, k], motions.problem.components
+        tape, m, names = segment.tape, len(segment.x), self.motions.problem.components
+        memory, before = tape.first.copy(), segment.begin[:, k]
         for first in range(0, len(segment.steps.h), PIECE):
             last = min(first + PIECE, len(segment.steps.h))
             # a row ends with the state after the step
             rows = run_passes(tape.of.forward, memory, last - first, 1, tape.feed(first, last))[:, :, k]
-            bad = ~np.isfinite(rows[:, -m:]).all(axis=1) | (rows[:, -m - 1] != 0.0 if self.programs.failed else False)
+            bad = ~np.isfinite(rows[:, -m:]).all(axis=1) | (rows[:, -m - 1] != 0.0 if self.programs[-1] else False)
             if bad.any():
                 break
             before = rows[-1, -m:]
@@ -178,27 +170,23 @@ class DifferentiatedRun:
         what = nonfinite(names, x) or unsolved(names, before, x)
         return f"stopped at t = {segment.steps.t[first + step + 1]:.6g} s: {what}"
 
-    def states(self, segment: Segment) -> tuple[Indices, Array]:
-        """After how many steps (T,), and states (T, m, N), from the start to the end: all that are kept."""
-        tape, count, m = segment.tape, len(segment.steps.h), len(segment.x)
+    def states(self, segment: Segment) -> Array:
+        """States (T, m, N) from the start to the end: all that are kept."""
+        tape, m = segment.tape, len(segment.x)
         if tape.checkpoints:
-            kept = [tape.value("x", memory) for *_, memory in tape.blocks]
-            return np.array([*[first for first, *_ in tape.blocks], count]), np.array([*kept, segment.x])
-        numbers = [np.arange(first + tape.every, last + 1, tape.every) for first, last, _ in tape.blocks]
-        rows = [kept[:, -m:] for *_, kept in tape.blocks]
-        if not len(numbers[-1]) or numbers[-1][-1] != count:
-            numbers, rows = [*numbers, np.array([count])], [*rows, segment.x[None]]
-        return np.concatenate([[0], *numbers]), np.concatenate([segment.begin[None], *rows])
+            return np.array([*[tape.value("x", memory) for *_, memory in tape.blocks], segment.x])
+        rows = np.concatenate([segment.begin[None], *[kept[:, -m:] for *_, kept in tape.blocks]])
+        whole = (len(rows) - 1) * tape.every == len(segment.steps.h)
+        return rows if whole else np.concatenate([rows, segment.x[None]])
 
     def cotangents(self, bars: Array) -> tuple[Array, Array]:
         """Cotangents (m + 1 + .., N) of start, t and inputs, from those of the end; and rows of forces of each step."""
         m, motions = len(self.x), self.motions
         for k, segment in reversed(list(enumerate(self.segments))):
             steps, end, later = segment.steps, segment.steps.t[-1], 0.0
-            if (reset := self._reset(steps)) is not None:
-                bars = self._cotangents_at(reset, segment.x, end, bars)
+            bars = self._cotangents_at(segment.reset, segment.x, end, bars)
             if steps.event:
-                g = self._gradient_at(steps.event, segment.x, end)
+                g = self._slopes(steps.event, segment.x, end)
                 # lambda with h_bar = x_bar dx/dh + t_bar + lambda (dg/dx dx/dh + dg/dt) = 0
                 slope = self._by_last_length(segment, g[:m]) + g[m]
                 bars = bars - (self._by_last_length(segment, bars[:m]) + bars[m]) / slope * g
@@ -208,7 +196,7 @@ class DifferentiatedRun:
             if segment.start is not None:
                 vectors, _, failed = segment.start.cotangents(vectors)
                 self._require_solved(failed)
-            begin, lengths = vectors.get("t", np.zeros((1, motions.many))), motions.equations.lengths
+            t_bar = vectors.get("t", np.zeros((1, motions.many)))
             if k:
                 # cotangents of the instants and lengths of the steps, to which the event adds at the last
                 t, h = rows[:, :2, 0].T.copy()
@@ -216,9 +204,10 @@ class DifferentiatedRun:
                 if steps.event:
                     h[-1] = 0.0  # which the event determines
                 # begin_bar = sum over steps of t_bar dt/dbegin + h_bar dh/dbegin
-                begin = begin + (t @ steps.by_t[:-1] + h @ steps.by_h)
-            inputs = [vectors.get(name, np.zeros((length, motions.many))) for name, length in lengths.items()]
-            bars = np.concatenate([vectors["x"], begin, bars[m + 1 :] + np.concatenate(inputs)])
+                t_bar = t_bar + (t @ steps.by_t[:-1] + h @ steps.by_h)
+            registers = motions.equations.registers(np.zeros_like(bars[m + 1 :]))
+            inputs = np.concatenate([vectors.get(name, zero) for name, zero in registers.items()])
+            bars = np.concatenate([vectors["x"], t_bar, bars[m + 1 :] + inputs])
         return self._cotangents_at(motions.equations.start, motions.x, float(self.t[0]), bars), rows
 
     def _by_last_length(self, segment: Segment, seed: Array) -> float:
@@ -237,15 +226,14 @@ class DifferentiatedRun:
         parts = []
         for segment in self.segments:
             steps, end = segment.steps, float(segment.steps.t[-1])
-            lengths = steps.by_h[:, None] * dots[m] if self.events else np.empty((0, 0))
-            times, given = steps.by_t[:, None] * dots[m], dots
+            lengths = steps.by_h[:, None] * dots[m] if motions.events else np.empty((0, 0))
+            times, moved = steps.by_t[:, None] * dots[m], dots
             if steps.event:  # the last column: the length of the last step alone
-                lengths[-1], given = 0.0, np.pad(dots, ((0, 0), (0, 1)))
-                lengths = np.pad(lengths, ((0, 0), (0, 1)))
-                lengths[-1, -1] = 1.0
-            states, tangents = self._along(segment, given, lengths)
+                moved, lengths = (np.pad(each, ((0, 0), (0, 1))) for each in (dots, lengths))
+                lengths[-1], lengths[-1, -1] = 0.0, 1.0
+            states, tangents = self._along(segment, moved, lengths)
             if steps.event:
-                g = self._gradient_at(steps.event, segment.x, end)[:, 0]
+                g = self._slopes(steps.event, segment.x, end)[:, 0]
                 tangents, slope = tangents[:, :, :-1], tangents[-1, :, -1]
                 # dg = dg/dx dx + dg/dt dt + dg/dp dp at fixed h, and dh = -dg / (dg/dx dx/dh + dg/dt)
                 length = -(g @ np.concatenate([tangents[-1], times[-2:-1], dots[m + 1 :]])) / (g[:m] @ slope + g[m])
@@ -254,15 +242,15 @@ class DifferentiatedRun:
                 times[-1] = times[-2] + length
             parts.append((steps.t, states, times, tangents))
             dots = np.concatenate([tangents[-1], times[-1:], dots[m + 1 :]])
-            dots = self._tangents_at(self._reset(steps), segment.x, end, dots)
-        if self._reset(self.segments[-1].steps) is not None:
+            dots = self._tangents_at(segment.reset, segment.x, end, dots)
+        if self.segments[-1].reset is not None:
             parts.append((self.t[-1:], self.x.T, dots[m : m + 1], dots[None, :m]))
         t, x, t_dot, x_dot = (np.concatenate(column) for column in zip(*parts, strict=True))
         if (graph := motions.equations.end) is not None:
             points = [*x.T[:, :, None], t[:, None], *motions.inputs[:, :, None]]
-            moved = [*points, *x_dot.swapaxes(0, 1), t_dot, *dots[m + 1 :]]
+            moving = [*points, *x_dot.swapaxes(0, 1), t_dot, *dots[m + 1 :]]
             x = values_of(graph, points, len(t), 1)[:, :, 0].T
-            x_dot = values_of(_tangent(graph), moved, *t_dot.shape).swapaxes(0, 1)
+            x_dot = values_of(_tangent(graph), moving, *t_dot.shape).swapaxes(0, 1)
         return t, x, t_dot, x_dot
 
     def _along(self, segment: Segment, dots: Array, lengths: Array) -> tuple[Array, Array]:
@@ -295,21 +283,20 @@ class DifferentiatedRun:
         if ((failed != 0.0) & np.isfinite(self.x).all(axis=0)).any():
             raise MotionError("the equations of a step's derivative were not solved: the step is too long")
 
-    def _gradient_at(self, event: str, x: Array, t: float) -> Array:
+    def _slopes(self, event: WatchedEvent, x: Array, t: float) -> Array:
         """Slopes of an event's quantity by x, t and inputs, (m + 1 + .., 1)."""
-        return _outputs(_pullback(self.events[event].values), np.append(self.motions.point(x, t), [[1.0]], axis=0))
+        return _outputs(pullback(event.values), np.append(self.motions.point(x, t), [[1.0]], axis=0))
 
     def _cotangents_at(self, graph: Graph | None, x: Array, t: float, bars: Array) -> Array:
-        """Cotangents (m + 1 + .., N) of x, t and inputs, with those of the state that a graph makes of them."""
+        """Cotangents (m + 1 + .., N) of x, t and inputs, from those of the state that a graph makes of them."""
         if graph is None:
             return bars
-        m = len(x)
-        before = _outputs(_pullback(graph), np.concatenate([self.motions.point(x, t), bars[:m]]))
-        before[m:] += bars[m:]
+        before = _outputs(pullback(graph), np.concatenate([self.motions.point(x, t), bars[: len(x)]]))
+        before[len(x) :] += bars[len(x) :]
         return before
 
     def _tangents_at(self, graph: Graph | None, x: Array, t: float, dots: Array) -> Array:
-        """Tangents (m + 1 + .., k) of x, t and inputs, x the state that a graph makes of them."""
+        """Tangents (m + 1 + .., k) of the state that a graph makes of x, t and inputs, and of t and inputs."""
         if graph is None:
             return dots
         moved = values_of(_tangent(graph), [*self.motions.point(x, t), *dots], dots.shape[1])
@@ -331,11 +318,6 @@ def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
         found[:, :, [k]] = run_passes(ready, memory, len(feed), 1, feed)
         memories[:, [k]] = memory
     return found
-
-
-@kept_by_first
-def _pullback(graph: Graph) -> Graph:
-    return cg.vjp(graph)
 
 
 @kept_by_first

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 
@@ -20,27 +19,28 @@ LOOSE_TOLERANCE = 1e-3  # a relative tolerance above it tells of a motion's grow
 ASIDE = 1.0 + 2.0**-52  # by which the other motion starts aside: what a rounding grows to is part of the error
 
 
-def doubts(
-    run: DifferentiatedRun,
-    values: Array | tuple[()] = (),
-    gradients: Mapping[str, Array] = MappingProxyType({}),
-    slopes: tuple[Array, Array] | None = None,
-) -> list[list[str]]:
-    """A sentence each, of every motion, which has an end.  values (N,), gradients (.., N): of the losses.
-
-    slopes: of the losses by the starts of the motions and by their ends, (m, N).
-    """
+def doubts(run: DifferentiatedRun) -> list[list[str]]:
+    """A sentence each, of every motion, which has an end."""
     said = [[*run.motions.said] for _ in range(run.motions.many)]
-    for sentences in (_other_momenta(run), _half_steps(run), [] if slopes is None else _chaos(run, *slopes)):
+    for sentences in (_other_momenta(run), _half_steps(run)):
         for texts, more in zip(said, sentences, strict=False):  # no sentences: of no motion
             texts += more
-    whole = [each.reshape(-1, len(said)) for each in gradients.values()]
-    suspects = [] if not whole or np.isfinite(np.concatenate(whole)).all() else [*gradients]
-    for k, (texts, value) in enumerate(zip(said, values, strict=False)):
+    return said
+
+
+def loss_doubts(
+    run: DifferentiatedRun, values: Array, gradients: Mapping[str, Array], start: Array, end: Array
+) -> list[list[str]]:
+    """Doubts of motions and of their losses, whose slopes by the states at start and end are (m, N)."""
+    said = doubts(run)
+    for texts, more in zip(said, _chaos(run, start, end), strict=False):
+        texts += more
+    finite = np.isfinite(np.concatenate([each.reshape(-1, len(said)) for each in gradients.values()])).all()
+    for k, (texts, value) in enumerate(zip(said, values, strict=True)):
         if not np.isfinite(value):
             texts.append(f"the loss is {value} of a motion that is finite")
         else:
-            bad = [name for name in suspects if not np.isfinite(gradients[name][..., k]).all()]
+            bad = [name for name in gradients if not (finite or np.isfinite(gradients[name][..., k]).all())]
             texts += [f"the loss is {value:.6g}, and its gradient by {name!r} is not finite" for name in bad]
     return said
 
@@ -50,29 +50,28 @@ def _other_momenta(run: DifferentiatedRun) -> list[list[str]]:
     motions, problem = run.motions, run.motions.problem
     if problem.missing is None:
         return []
-    kept = [(segment.steps.t, *run.states(segment)) for segment in run.segments]
-    t, rows = np.concatenate([t[steps] for t, steps, _ in kept]), np.concatenate([x for *_, x in kept])
-    held = motions.inputs[: len(problem.missing.inputs) - problem.size - 1].T
-    starts = zip(motions.x.T, np.moveaxis(rows, -1, 0), held, strict=True)
+    times, rows = [each.steps.t for each in run.segments], np.concatenate([run.states(each) for each in run.segments])
+    for k, tape in enumerate([each.tape for each in run.segments]):
+        if tape.checkpoints:
+            times[k] = times[k][[*[first for first, *_ in tape.blocks], -1]]
+    t = np.concatenate(times)
+    starts = zip(motions.x.T, np.moveaxis(rows, -1, 0), motions.inputs.T, strict=True)
     return [unreached_momenta(problem, t, x, p, start=(float(t[0]), start, x[0])) for start, x, p in starts]
 
 
 def _chaos(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
-    """Flag of every motion: whether the error at its start may change the loss by more than its own size does.
-
-    start, end: slopes of the loss by the state there. Of a loss along the way alone, its value is compared.
-    """
-    motion, options = run.motions, run.motions.options
-    left = min(options.relative, LOOSE_TOLERANCE) if options.adaptive else ASIDE - 1.0
+    """Whether the error at the start of a motion may change the loss by more than its own size does."""
+    motions, options = run.motions, run.motions.options
+    error = min(options.relative, LOOSE_TOLERANCE) if options.adaptive else ASIDE - 1.0
     with np.errstate(all="ignore"):
-        change = left * (np.abs(start) * np.maximum(np.abs(motion.x), np.abs(run.end))).sum(axis=0)
+        change = error * (np.abs(start) * np.maximum(np.abs(motions.x), np.abs(run.end))).sum(axis=0)
         slope, loss = np.abs(end), np.abs(run.loss)
         if not (change > (slope * np.abs(run.x)).sum(axis=0) + loss).any():  # the end is enough
             return []
-        at_end = np.max([np.abs(run.states(each)[1]).max(axis=0) for each in run.segments], axis=0)
-        whole = (slope * at_end).sum(axis=0) + loss
+        largest = np.max([np.abs(run.states(each)).max(axis=0) for each in run.segments], axis=0)
+        whole = (slope * largest).sum(axis=0) + loss
         ratios = np.where(whole > 0.0, change / whole, 0.0)
-    what = f"rtol = {left:g}" if options.adaptive else "rounding"
+    what = f"rtol = {error:g}" if options.adaptive else "rounding"
     text = (
         f"the motion is chaotic, or nearly so: by its end {what} at its start has grown to {{:.2g}} times its size, "
         "and the gradient is that of the numbers computed, not of the motion"
@@ -81,28 +80,25 @@ def _chaos(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
 
 
 def _half_steps(run: DifferentiatedRun) -> list[list[str]]:
-    """Error of every motion by equal steps, beside the motion by steps of half the length, where it is too large.
-
-    Half of a step has the force of the step.
-    """
+    """Errors of motions by equal steps, beside steps of half the length with the same forces, that are too large."""
     motions, options = run.motions, run.motions.options
     if not options.estimated:
         return []
+    halves = tuple([each.steps.half_steps() for each in run.segments])
     tau = np.repeat(motions.tau, 2, axis=0) if motions.each_step else motions.tau
-    beside = replace(
-        motions, x=motions.x * ASIDE, steps=tuple([each.steps.half_steps() for each in run.segments]), tau=tau
-    )
-    every = [2 * (each.tape.checkpoints or max(1, len(each.steps.h) // LOOKS)) for each in run.segments]
+    every = [each.tape.checkpoints or max(1, len(each.steps.h) // LOOKS) for each in run.segments]
+    text = "its error is unknown: in steps of half the length "
     try:
-        other = DifferentiatedRun(beside, run.running, forwards=run.forwards, every=every)
+        beside = replace(motions, x=motions.x * ASIDE, steps=halves, tau=tau)
+        other = DifferentiatedRun(beside, forwards=run.forwards, every=[2 * each for each in every])
     except MotionError as stopped:
-        return [[f"its error is unknown: in steps of half the length {stopped}"]]
+        return [[f"{text}{stopped}"]]
     size, difference = np.zeros((2, motions.many, motions.problem.size))
-    for whole, half in zip(run.segments, other.segments, strict=True):
-        (steps, rows), (halves, others) = run.states(whole), other.states(half)
-        here, there = np.intersect1d(2 * steps, halves, assume_unique=True, return_indices=True)[1:]
+    for whole, half, steps in zip(run.segments, other.segments, every, strict=True):
+        rows, others = run.states(whole), other.states(half)
+        same = np.append(rows[: -1 : 1 if whole.tape.checkpoints else steps], rows[-1:], axis=0)
         size = np.maximum(size, np.abs(rows).max(axis=0).T)
-        difference = np.maximum(difference, np.abs(others[there] - rows[here]).max(axis=0).T)
+        difference = np.maximum(difference, np.abs(others - same).max(axis=0).T)
     scale = state_kinds(motions.problem).scale(size)
     allowed = options.absolute + options.relative * scale
     relative = np.divide(difference, scale, out=np.zeros_like(scale), where=difference != 0.0)
@@ -112,8 +108,7 @@ def _half_steps(run: DifferentiatedRun) -> list[list[str]]:
     said: list[list[str]] = [[] for _ in size]
     for k in np.flatnonzero(np.isfinite(size).all(axis=1)).tolist():  # of the motions that have an end
         if not np.isfinite(difference[k]).all():
-            stopped_at = other.stopped(k, other.segments[-1])
-            said[k].append(f"its error is unknown: in steps of half the length the motion {stopped_at}")
+            said[k].append(f"{text}the motion {other.stopped(k, other.segments[-1])}")
         elif off := off_by(error[k], scale[k], allowed[k], motions.problem.components):
             bound = f"rtol = {options.relative:g} allows less, and steps of {longest:.6g} s are too long for that"
             said[k].append(f"{off}; {bound}")

@@ -1,11 +1,11 @@
-"""Gradients of motions, one or many: losses of where they end and how they go, by the discrete adjoint."""
+"""Derivatives of motions: gradients of losses by the discrete adjoint, sensitivities of all states by forward mode."""
 
 from __future__ import annotations
 
 import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Unpack
 
 import numpy as np
@@ -13,22 +13,19 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array, kept_by_first, memo
-from cgraph.extend import topological
+from cgraph._shared import Array, kept_by_first
 
-from ...integrators import Problem, quantity
 from ...systems.model import Model
 from ..applied_force import Constant
-from ..events.event import Event, as_events
+from ..events.event import Event
 from ..outcome import MotionError
 from ..run_options import Options
 from ..trajectory import SimulationWarning
 from .differentiated_run import DifferentiatedRun
-from .doubts import doubts
+from .doubts import doubts, loss_doubts
 from .motion_programs import outputs_at
-from .motions import TORQUE, Loss, Motions, motions_of
+from .motions import TORQUE, Differentiation, Loss, Motions
 
-LOSSES_KEPT = 64  # losses whose graphs stay for another run
 FEW_MOTIONS = 4  # motions: fewer by a method that iterates are done sooner one by one
 WIDE_BLOCK = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
 
@@ -46,8 +43,7 @@ class MotionGradient:
         row a step; of a parameter a number. Where velocities are no rates of coordinates, as of quaternions, "q" is by
         small displacements xi, dq = G(q) xi, (n,).
     t : ndarray, (steps + 1,)
-        Where the steps begin, and the last one ends [s]. Of N motions in chosen steps, which each has for itself, start
-        and end alone, (2,).
+        Where the steps begin, and the last one ends [s]; of N motions in chosen steps start and end alone, (2,).
     q, qd : ndarray, (nq,) and (n,)
         Where the motion ends; of an OdeSystem q is its state and qd is empty.
     checkpoints : int
@@ -94,26 +90,19 @@ def gradient(
     The discrete adjoint: the exact derivative of the numbers that the method computes, to rounding. Steps that are
     chosen by error are those of `simulate`, and count as constants, so that slopes are less exact than the motion: of
     an orbit of eccentricity 0.99 they are good to 7e-5 at the `rtol` by which it is to 2e-8. What `simulate` would warn
-    of is a `SimulationWarning` here, too, and so is a loss that is not finite. Every step is run once and pulled back
-    once, as machine code; where what that needs of all of them would take more than 128 MB, one state in every
-    sqrt(steps) is kept, and the steps between are made again.
+    of is a `SimulationWarning`, and so is a loss that is not finite. Where the record of all steps would take more than
+    128 MB, one state in every sqrt(steps) is kept, and the steps between are made again.
 
     Parameters
     ----------
-    model : System, OdeSystem, Mechanism or Scene
-        What moves.
+    model, q, qd, t_end
+        As for `simulate`.
     loss : callable, optional
         (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node or a number; of an OdeSystem
         (x, t) or (x, t, p). None for a running loss alone.
-    q, qd, t_end
-        As for `simulate`.
-    parameters : mapping, optional
-        {name: value} in place of the model's own, and of those of a controller, as for `simulate`; and of those that
-        the losses alone read, such as a goal.
     method : str, optional
-        A name of `dyn.METHODS`, of equal or chosen steps. By default that of `simulate`, "dop853", which chooses its
-        steps; and "rk4" where `dt` or a row of forces a step asks for equal ones. Equations that are
-        iterated are solved to rounding, of implicit methods and of their derivatives.
+        A name of `dyn.METHODS`. By default that of `simulate`, "dop853", which chooses its steps; and "rk4" where `dt`
+        or a row of forces a step asks for equal ones. Implicit equations and their derivatives are solved to rounding.
     running : callable, optional
         (q, qd, tau, t) or (q, qd, tau, t, p) to a node, summed over the steps, at the state, force and time where each
         begins; of an OdeSystem (x, t) or (x, t, p). An integral is dt times that.
@@ -122,10 +111,12 @@ def gradient(
     tau : float, array_like or callable
         Applied force [N m or N]: constant, (n,); of equal steps one row a step, (steps, n), which says how many there
         are; or a controller in closed form, as for `simulate`, whose parameters may be in `wrt`.
+    parameters : mapping, optional
+        {name: value}, as for `simulate`; and of those that the losses alone read, such as a goal.
     events : Event or iterable of Event
-        Those of `simulate`: where one ends the motion or resets its state depends on all before, and so do the steps
-        after it. The motion arrives there by a step of its own length, where `simulate` reads the state off its dense
-        output: `value` may differ from that of its run by the error of a step. Not with a row of forces a step.
+        As for `simulate`: where one ends the motion or resets its state depends on all before. The motion arrives there
+        by a step of its own length, so that `value` may differ from that of `simulate` by the error of a step. Not with
+        a row of forces a step.
     **options
         Those of `dyn.Options` but `max_steps`, `dense_output`, `fma` and `progress`. The error of equal steps is
         estimated by a motion in steps of half the length, which takes half as long again.
@@ -156,40 +147,13 @@ def gradient(
     (-0.403412, [-0.880376], (100, 1))
     """
     losses = loss, running
-    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, as_events(events), losses, options)
-    run, values, slopes, bars = losses_and_gradients(motions, *losses)
-    for text in doubts(run, values, slopes, bars)[0]:
+    motions = Differentiation(model, losses, t_end, method, tau, parameters, wrt, events, options)(q, qd)
+    run, values, slopes, said = _gradients(motions)
+    for text in said[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     nq, x = motions.problem.nq, run.end[:, 0]
     gradients = {name: each[..., 0] if each.ndim > 1 else float(each[0]) for name, each in slopes.items()}
     return MotionGradient(float(values[0]), gradients, run.t, x[:nq], x[nq:], run.checkpoints)
-
-
-def losses_and_gradients(
-    motions: Motions, loss: Loss | None, running: Loss | None
-) -> tuple[DifferentiatedRun, Array, dict[str, Array], tuple[Array, Array]]:
-    """The run of motions, losses (N,), their gradients (.., N) by names, and their slopes by start and end, (m, N)."""
-    problem, equations = motions.problem, motions.equations
-    if loss is None and running is None:
-        raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
-    final = None if loss is None else loss_graph(problem, quantity(problem, "loss", loss, constant=True))
-    total = None
-    if running is not None:
-        total = loss_graph(problem, quantity(problem, "running", running, motions.applied, constant=True))
-    run = DifferentiatedRun(motions, total)
-    point = run.motions.point(run.x, float(run.t[-1]))
-    value, *slopes = (
-        np.zeros_like(point[:1])
-        if final is None
-        else outputs_at(loss_and_slopes(final, motions.options.backend), point)
-    )
-    end = np.array(slopes) if slopes else np.zeros_like(point)
-    start, rows = run.cotangents(end)
-    gradients = motions.by_names(start)
-    if motions.each_step and TORQUE in gradients:
-        rows[-1] += end[problem.size + 1 :][: equations.forces]  # what the final loss has of the force itself
-        gradients[TORQUE] = rows
-    return run, value + run.loss, gradients, (start[: problem.size], end[: problem.size])
 
 
 def gradient_many(
@@ -214,14 +178,10 @@ def gradient_many(
 
     Parameters
     ----------
-    model : System, OdeSystem, Mechanism or Scene
-        What moves.
+    model, loss, t_end, method, running, wrt, **options
+        As for `gradient`.
     q, qd : array_like
         The starts, (N, nq) and (N, n), or (nq,) and (n,) for all; of an OdeSystem q is the state, and qd None.
-    loss, t_end, running, wrt, **options
-        As for `gradient`.
-    method : str, optional
-        As for `gradient`: "dop853", and "rk4" where `dt` or a row of forces a step asks for equal steps.
     tau : float, array_like or callable
         Applied force [N m or N]: constant, (n,) or (N, n); a row a step, (N, steps, n); or a controller in closed form.
     parameters : mapping, optional
@@ -246,19 +206,20 @@ def gradient_many(
     ([[-0.8804], [-1.1123], [-0.595]], (3,))
     """
     losses = loss, running
-    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, (), losses, options, many=True)
-    count, problem, run_options = motions.many, motions.problem, motions.options
-    value, end, checkpoints = np.full(count, np.nan), np.full((count, problem.size), np.nan), 0
-    by_name = {name: each.T.copy() for name, each in motions.by_names(np.full_like(motions.point(), np.nan)).items()}
-    if motions.each_step and TORQUE in by_name:
-        by_name[TORQUE] = np.full((count, *motions.tau.shape[:-1]), np.nan)
+    motions = Differentiation(model, losses, t_end, method, tau, parameters, wrt, (), options, many=True)(q, qd)
+    count, problem, settings = motions.many, motions.problem, motions.options
+    values, end, checkpoints = np.full(count, np.nan), np.full((count, problem.size), np.nan), 0
+    nothing = motions.by_names(np.full_like(motions.point(motions.x, 0.0), np.nan))
+    gradients = {name: each.T.copy() for name, each in nothing.items()}
+    if motions.each_step and TORQUE in gradients:
+        gradients[TORQUE] = np.full((count, *motions.tau.shape[:-1]), np.nan)
     # one by one, or side by side, of which a last one goes with those before it
-    alone = run_options.adaptive or (count < FEW_MOTIONS and run_options.integrator.step(problem).iterates)
+    alone = settings.adaptive or (count < FEW_MOTIONS and settings.integrator.step(problem).iterates)
     begins = [*(range(count) if alone else range(0, max(1, count - 1), WIDE_BLOCK)), count]
     early, said, parts = dict[int, str](), dict[int, str](), [range(*ends) for ends in itertools.pairwise(begins)]
     for part in parts:
         try:
-            run, losses_of_part, slopes, bars = losses_and_gradients(motions.of(slice(part.start, part.stop)), *losses)
+            run, losses_of_part, slopes, sentences = _gradients(motions.of(slice(part.start, part.stop)))
         except MotionError as error:
             if len(part) == 1:
                 early[part[0]] = str(error)
@@ -267,50 +228,145 @@ def gradient_many(
             continue
         checkpoints = max(checkpoints, run.checkpoints)
         arrived = np.asarray(np.isfinite(run.end).all(axis=0))
-        rows = part.start + np.flatnonzero(arrived)
-        results = [(value, losses_of_part), (end, run.end), *[(by_name[name], slopes[name]) for name in slopes]]
+        results = [(values, losses_of_part), (end, run.end), *[(gradients[name], slopes[name]) for name in slopes]]
         for table, array in results:
-            table[rows] = np.moveaxis(array, -1, 0)[arrived]
-        for number, whole, sentences in zip(part, arrived, doubts(run, losses_of_part, slopes, bars), strict=True):
+            table[part.start : part.stop][arrived] = np.moveaxis(array, -1, 0)[arrived]
+        for k, whole, texts in zip(part, arrived, sentences, strict=True):
             if not whole:
-                early[number] = f"the motion {run.stopped(number - part[0], run.segments[0])}"
-            elif sentences:
-                said[number] = sentences[0]
+                early[k] = f"the motion {run.stopped(k - part[0], run.segments[0])}"
+            elif texts:
+                said[k] = texts[0]
     for each, what in ((early, "stopped early"), (said, "doubtful")):
         if each:
             first, text = min(each.items())
             text = f"{len(each)} of {count} motions {what}: motion {first}: {text}"
             warnings.warn(text, SimulationWarning, stacklevel=2)
-    t = motions.steps[0].t.copy() if motions.steps else np.array([run_options.t0, run_options.t_end])
-    return MotionGradient(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :], checkpoints)
+    t = motions.steps[0].t.copy() if motions.steps else np.array([settings.t0, settings.t_end])
+    return MotionGradient(values, gradients, t, end[:, : problem.nq], end[:, problem.nq :], checkpoints)
 
 
-@dataclass(frozen=True)
-class _Quantity:
-    """A quantity of a problem, known by its operations, so that what is derived from it is derived once."""
-
-    problem: Problem
-    key: tuple[object, ...]
-    node: Node = field(compare=False)
-
-
-def loss_graph(problem: Problem, node: Node) -> Graph:
-    """The loss over the states, t and parameters; the same object for an equal one."""
-    order = topological([node])
-    places = {each: k for k, each in enumerate(order)}
-    leaves = [each.name if each.value is None else float(each.value).hex() for each in order]  # 0.0 and -0.0 apart
-    key = [(each.op.name, leaf, *[places[arg] for arg in each.args]) for each, leaf in zip(order, leaves, strict=True)]
-    return _bound(_Quantity(problem, tuple(key), node))
-
-
-@memo(LOSSES_KEPT)
-def _bound(quantity: _Quantity) -> Graph:
-    return quantity.problem.observed({"loss": quantity.node})
+def _gradients(motions: Motions) -> tuple[DifferentiatedRun, Array, dict[str, Array], list[list[str]]]:
+    """The run of motions, losses (N,), their gradients (.., N) by names, and doubts of every motion."""
+    if motions.final is None and motions.running is None:
+        raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
+    run, m = DifferentiatedRun(motions), motions.problem.size
+    point = motions.point(run.x, float(run.t[-1]))
+    value, end = np.zeros(motions.many), np.zeros_like(point)
+    if motions.final is not None:
+        value, *slopes = outputs_at(_loss_and_slopes(motions.final), motions.options.backend, point)
+        end = np.array(slopes)
+    start, rows = run.cotangents(end)
+    gradients, values = motions.by_names(start), value + run.loss
+    if motions.each_step and TORQUE in gradients:
+        rows[-1] += end[m + 1 :][: motions.equations.forces]  # what the final loss has of the force itself
+        gradients[TORQUE] = rows
+    return run, values, gradients, loss_doubts(run, values, gradients, start[:m], end[:m])
 
 
 @kept_by_first
-def loss_and_slopes(graph: Graph, backend: str) -> Any:
-    """The loss, and its slopes by all inputs, as a function."""
-    slopes = cg.gradient(graph)
-    both = {"loss": graph.only_output()} | {f"slope{k}": node for k, node in enumerate(slopes.outputs.values())}
-    return cg.compile(cg.simplify(Graph(graph.inputs, both)), backend)
+def _loss_and_slopes(loss: Graph) -> Graph:
+    """A loss, and its slopes by all inputs."""
+    slopes = {f"slope{k}": node for k, node in enumerate(cg.gradient(loss).outputs.values())}
+    return cg.simplify(Graph(loss.inputs, {"loss": loss.only_output()} | slopes))
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """A motion, and the derivatives of its states.
+
+    Attributes
+    ----------
+    t : ndarray, (T,)
+        Times of the rows: the start, and the end of every step [s].
+    q, qd : ndarray, (T, nq) and (T, n)
+        The motion; of an OdeSystem q is its state and qd has no columns.
+    derivatives : dict of str to ndarray
+        By the names of `wrt`, those of the state x = (q, qd), of m numbers: (T, m, n) by "q", "qd" and "tau", of an
+        OdeSystem (T, m, m) by "q", and (T, m) by a parameter. By "q" they are as those of `MotionGradient`.
+    times : dict of str to ndarray
+        Those of `t`, (T, n), (T, m) or (T,): 0 but where an event is, and at equal steps after it. What a row has at a
+        fixed time is `derivatives` less the rate of the state times this.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0], [1.0])
+    >>> result = dyn.sensitivities(arm, [0.5], [0.0], t_end=0.1, dt=0.05, wrt="q")
+    >>> result.t.round(3).tolist(), result["q"].shape
+    ([0.0, 0.05, 0.1], (3, 2, 1))
+    """
+
+    t: Array
+    q: Array
+    qd: Array
+    derivatives: dict[str, Array]
+    times: dict[str, Array]
+
+    def __getitem__(self, name: str) -> Array:
+        """The derivatives by one of `wrt`. Raises KeyError for another name."""
+        return self.derivatives[name]
+
+
+def sensitivities(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    t_end: float | None = None,
+    method: str | None = None,
+    *,
+    wrt: str | Iterable[str] | None = None,
+    tau: Constant | Callable[..., Sequence[Node | float]] = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    events: Event | Iterable[Event] = (),
+    **options: Unpack[Options],
+) -> Sensitivities:
+    """A motion and the derivatives of all its states, by forward mode through every step.
+
+    The derivatives are those of the numbers that the method computes, exact to rounding; steps that are chosen by error
+    count as constants. Their cost grows with the number of columns; `gradient` gives one loss by any number of inputs.
+
+    Parameters
+    ----------
+    model, q, qd, t_end, method, wrt, parameters, **options
+        As for `gradient`.
+    tau : float, sequence or callable
+        Applied force [N m or N], constant, or a controller in closed form.
+    events : Event or iterable of Event
+        As for `gradient`. Where one resets the state there are two rows, before and after.
+
+    Returns
+    -------
+    Sensitivities
+        `t`, `q`, `qd`, and the derivatives by each name of `wrt`, as `result["q"]`.
+
+    Raises
+    ------
+    TypeError, ValueError, MotionError, SingularMassMatrixError
+        As `gradient` does.
+
+    Examples
+    --------
+    How a pendulum's angle and velocity depend on its mass after one second and after two:
+
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(["m"], [1.0], damping=0.5, parameters={"m": 1.0})
+    >>> result = dyn.sensitivities(arm, [0.5], [0.0], t_end=2.0, dt=0.01, wrt=["m"])
+    >>> result["m"][[100, 200]].round(4).tolist()
+    [[-0.1275, 0.4627], [0.0445, -0.6321]]
+    """
+    motions = Differentiation(model, (None, None), t_end, method, tau, parameters, wrt, events, options)(q, qd)
+    if motions.each_step:
+        raise ValueError(f"tau must be constant, (n,), got shape {motions.tau.shape[:-1]}: gradient takes a row a step")
+    run = DifferentiatedRun(motions, forwards=True)
+    for text in doubts(run)[0]:
+        warnings.warn(text, SimulationWarning, stacklevel=2)
+    # a column for each number of `wrt`: the transpose of how cotangents of it are made of those of x, t and inputs
+    units = np.eye(motions.problem.size + 1 + len(motions.inputs))
+    by = {name: np.atleast_2d(rows) for name, rows in motions.of([0] * len(units)).by_names(units).items()}
+    t, x, t_dot, x_dot = run.tangents(np.concatenate([*by.values()]).T)
+    ends, nq = np.cumsum([len(rows) for rows in by.values()]), motions.problem.nq
+    columns: dict[str, Any] = {name: slice(end - len(by[name]), end) for name, end in zip(by, ends, strict=True)}
+    columns |= {name: end - 1 for name, end in zip(by, ends, strict=True) if name in motions.equations.names}
+    derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
+    times = {name: t_dot[:, place] for name, place in columns.items()}
+    return Sensitivities(t, x[:, :nq], x[:, nq:], derivatives, times)

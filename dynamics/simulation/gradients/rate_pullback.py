@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents, topological
+from cgraph.extend import Builder, SingularError, building, cotangents, folded, tangents, topological
 
 from ...equations.bias_terms import bias_terms
 from ...equations.constraints.constraints import constraint_rows
@@ -22,7 +22,6 @@ from ...integrators import Problem
 from ...systems.arguments import new_variables
 from ...systems.system import System
 
-ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 ARITHMETIC = ("add", "sub", "mul", "neg")
 
 
@@ -30,8 +29,7 @@ ARITHMETIC = ("add", "sub", "mul", "neg")
 class RatePullback:
     """Inputs to differentiate by -> graph: inputs those of the rate, values, cotangents of the rate's outputs.
 
-    inputs: of the rate.  values, bars: of its outputs.  mu: variables.  power: -mu . r over these and the inputs.
-    solved: what mu is, over the inputs and bars.  q_dot: rates of the coordinates.
+    values, bars: variables of the outputs.  mu: variables.  nodes: -mu . r, then what mu is, then rates of coordinates.
     shared: {node of the rate and of these: variable}, which are values besides.
     """
 
@@ -39,23 +37,19 @@ class RatePullback:
     values: Sequence[Node]
     bars: Sequence[Node]
     mu: Sequence[Node]
-    power: Node
-    solved: Sequence[Node]
-    q_dot: Sequence[Node]
+    nodes: Sequence[Node]
     shared: Mapping[Node, Node] = field(default_factory=dict)
 
     def __call__(self, wrt: Sequence[Node]) -> Graph:
         """The graph for these inputs."""
-        build = Builder()
-        n = len(self.mu)
-        power, *rest = folded([self.power, *self.solved, *self.q_dot, *self.shared], build)
-        solved, q_dot, shared = rest[:n], rest[n : len(rest) - len(self.shared)], rest[len(rest) - len(self.shared) :]
-        seeds: dict[Node, Node] = {power: ONE}
+        build, n, count = Builder(), len(self.mu), len(self.nodes)
+        copies = folded([*self.nodes, *self.shared], build)
+        seeds: dict[Node, Node] = {copies[0]: cg.constant(1.0)}
         with building(build):
-            for node, bar in zip(q_dot, self.bars, strict=False):  # the other bars are those of accelerations
+            for node, bar in zip(copies[1 + n : count], self.bars, strict=False):  # the other bars: of accelerations
                 seeds[node] = seeds[node] + bar if node in seeds else bar
-        known = dict(zip(shared, self.shared.values(), strict=True))
-        known |= dict(zip(self.mu, substitute(solved, known), strict=True))
+        known = dict(zip(copies[count:], self.shared.values(), strict=True))
+        known |= dict(zip(self.mu, substitute(copies[1 : 1 + n], known), strict=True))
         pulled = substitute(cotangents(seeds, wrt, build), known)
         outputs = {f"{k}": node for k, node in enumerate(pulled)}
         return cg.simplify(Graph([*self.inputs, *self.values, *self.shared.values(), *self.bars], outputs))
@@ -68,10 +62,9 @@ def rate_pullback(problem: Problem) -> RatePullback | None:
         return None
     taken = [*problem.rate.input_names, *system.parameters]
     values, bars, mu = (new_variables(what, n, taken) for what, n in (("value", m), ("bar", m), ("mu", system.n)))
-    of_accelerations = slice(m - system.n, m)
+    qdd, qdd_bar = values[m - system.n :], bars[m - system.n :]
     try:
-        power = _power(system, mu, values[of_accelerations])
-        ways = [by(system, bars[of_accelerations]) for by in (_eliminated, _factored)[: 1 + (system.n <= DENSE_UP_TO)]]
+        power, ways = _power(system, mu, qdd), _solutions(system, qdd_bar)
     except SingularError:
         return None
     more = [*values, *bars, *mu]
@@ -82,8 +75,8 @@ def rate_pullback(problem: Problem) -> RatePullback | None:
         return [*problem.bind(names, Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})).outputs.values()]
 
     power, *q_dot = bound([power, *system.q_dot])
-    solved = min([bound(way) for way in ways], key=lambda nodes: _more_than(problem.rate, nodes))
-    return RatePullback(problem.rate.inputs, values, bars, mu, power, solved, q_dot)
+    solved = min([bound(way) for way in ways], key=lambda nodes: _unshared_count(problem.rate, nodes))
+    return RatePullback(problem.rate.inputs, values, bars, mu, [power, *solved, *q_dot])
 
 
 def sharing(rate: Graph, pullback: RatePullback) -> tuple[Graph, RatePullback]:
@@ -91,16 +84,17 @@ def sharing(rate: Graph, pullback: RatePullback) -> tuple[Graph, RatePullback]:
 
     These are what slopes of the power by the state, and what is solved, read; of them the cheap are made again.
     """
+    power, *solved = pullback.nodes[: 1 + len(pullback.mu)]
     here = {node for node in rate.nodes if node.args}
-    moving, needed = {*rate.inputs[: len(rate.outputs)]}, set(pullback.solved)
-    for node in topological([pullback.power]):
+    moving, needed = {*rate.inputs[: len(rate.outputs)]}, set(solved)
+    for node in topological([power]):
         moves = [arg in moving for arg in node.args]
         moving |= {node} if any(moves) else set()
         if node.op.name == "mul":
             needed |= {arg for arg, other in zip(node.args, reversed(moves), strict=True) if other}
         elif any(moves) and node.op.name not in ARITHMETIC:
             needed |= {node, *node.args}
-    order = topological([pullback.power, *pullback.solved])
+    order = topological([power, *solved])
     for node in reversed(order):
         if node in needed and node not in here:
             needed |= {*node.args}
@@ -114,21 +108,16 @@ def sharing(rate: Graph, pullback: RatePullback) -> tuple[Graph, RatePullback]:
     return Graph(rate.inputs, {**rate.outputs, **more}), replace(pullback, shared=shared)
 
 
-def _eliminated(system: System, rhs: Sequence[Node]) -> list[Node]:
-    """M^-1 rhs by elimination, as long chains are solved."""
-    build = Builder()
-    (lagrangian,) = folded([system.lagrangian], build)
-    return solve_nodes(lagrangian, system.qd, rhs, build)
-
-
-def _factored(system: System, rhs: Sequence[Node]) -> list[Node]:
-    """M^-1 rhs by the factors of the whole M, as short chains are solved."""
-    build = Builder()
+def _solutions(system: System, rhs: Sequence[Node]) -> list[list[Node]]:
+    """M^-1 rhs by elimination, as long chains are solved, and of short ones by the factors of the whole M."""
     rows, lagrangian = constraint_rows(system, []), bias_terms(system).lagrangian
-    return rows.solve_densely(system, lagrangian, rhs, build, composites=True)
+    solved = [rows.solve(system, lagrangian, rhs, Builder())]
+    if system.n <= DENSE_UP_TO:
+        solved.append(rows.solve_densely(system, lagrangian, rhs, Builder(), composites=True))
+    return solved
 
 
-def _more_than(rate: Graph, nodes: Sequence[Node]) -> int:
+def _unshared_count(rate: Graph, nodes: Sequence[Node]) -> int:
     """Number of nodes of these besides those of the rate, whose solution they may share."""
     copies = folded([*rate.outputs.values(), *nodes], Builder())
     return len(topological(copies)) - len(topological(copies[: len(rate.outputs)]))
@@ -138,10 +127,10 @@ def _power(system: System, mu: Sequence[Node], qdd: Sequence[Node]) -> Node:
     """-mu . (M qdd + bias - tau - forces + D qd), each force where it works: on the velocity that mu makes of it."""
     terms, build = bias_terms(system, qdd), Builder()
     along = tangents(dict(zip(system.qd, mu, strict=True)), list(terms.inertial), build)
-    power = ZERO
+    power = zero = cg.constant(0.0)
     with building(build):
         for velocity, force in terms.inertial.items():
-            power = power - force * along.get(velocity, ZERO)
+            power = power - force * along.get(velocity, zero)
         rows = zip(mu, terms.gradient, system.tau, terms.forces, system.damping, system.qd, strict=True)
         for speed, slope, tau, applied, damping, qd in rows:
             power = power + speed * (slope + tau + applied - damping * qd)

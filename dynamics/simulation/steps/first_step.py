@@ -82,7 +82,7 @@ def _of_start(statements: Sequence[Statement], shared: Collection[str]) -> tuple
         bodies: dict[str, Any] = {body: _of_start(getattr(statement, body), shared) for body in row.bodies}
         fields = dict.fromkeys([*row.reads, *row.writes])
         named = with_names(statement, fields, lambda name: name if name in shared else f"{START}{name}")
-        result.append(replace(named, **bodies))  # type: ignore[type-var]
+        result.append(replace(named, **bodies))
     return tuple(result)
 
 

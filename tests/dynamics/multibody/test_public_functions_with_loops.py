@@ -12,7 +12,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph._shared import Array
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.simulation.gradients.sensitivities import Sensitivities
+from dynamics.simulation.gradients.gradient import Sensitivities
 
 from ..linkages import bar, four_bar
 

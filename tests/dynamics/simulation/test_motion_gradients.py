@@ -18,13 +18,14 @@ from dynamics.integrators import derive
 from dynamics.simulation.gradients import differentiated_run
 from dynamics.simulation.gradients.gradient import MotionGradient
 from dynamics.simulation.gradients.motion_programs import motion_equations
-from dynamics.simulation.gradients.rate_pullback import rate_pullback, sharing
+from dynamics.simulation.gradients.rate_pullback import RatePullback, rate_pullback, sharing
 from tests.bench.speed.scenes import load
 from tests.dynamics.mechanisms import random_mechanism
 from tests.dynamics.models import driven_pendulum, magnetic, random_arm, relativistic
 from tests.dynamics.parametrized import parametrized
 from tests.slow import slow
 from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM, SOLVED
+from tests.trust.random_motions import random_task
 
 DUAL = 1e-12  # of the size of the terms: a gradient beside forward sensitivities
 DIFFERENCES = 2e-8  # central differences over 1e-5 of float64
@@ -322,6 +323,13 @@ def test_a_rate_is_pulled_back_by_what_it_has_solved(name: str, count: int) -> N
     shared = sharing(equations.problem.rate, equations.pullback)
     pulled = shared[1]([*equations.problem.rate.inputs[: 2 * n]])
     assert sum([bool(node.args) for node in pulled.nodes]) == count
+
+
+def test_a_rate_that_shares_nothing_with_its_pullback_is_pulled_back_by_its_graph() -> None:
+    """Which rounds less."""
+    task, motion = random_task(15), {"t_end": 1e-6, "dt": 1e-7, "estimate_error": False}
+    with patch.object(RatePullback, "__call__", side_effect=AssertionError):
+        dyn.gradient(task.model, lambda q, qd, t: q[0], task.q, task.qd, **motion)
 
 
 def test_checkpoints_give_the_same_numbers() -> None:
