@@ -238,16 +238,17 @@ CALLS = {
     "dyn.gradient": call(
         dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "euler", running=lambda q, qd, tau, t: q[0],
         wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
-        parameters=None, events=(), estimate_error=False, backend="python"
+        parameters=None, events=(), estimate_error=False, backend="python", form="velocity"
     ),
     "dyn.gradient_many": call(
         dyn.gradient_many, ARM, lambda q, qd, t: q[0], [[0.1]], [[0.0]], 1.0, "euler",
         running=lambda q, qd, tau, t: q[0], wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None, rtol=None, atol=None,
-        first_step=None, tau=[[0.0]], parameters={}, estimate_error=False, backend="python"
+        first_step=None, tau=[[0.0]], parameters={}, estimate_error=False, backend="python", form="velocity"
     ),
     "dyn.sensitivities": call(
         dyn.sensitivities, ARM, [0.1], [0.0], 1.0, "euler", wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None,
-        rtol=None, atol=None, first_step=None, tau=[0.0], parameters=None, estimate_error=False, backend="python"
+        rtol=None, atol=None, first_step=None, tau=[0.0], parameters=None, estimate_error=False, backend="python",
+        form="velocity", events=()
     ),
     "dyn.simulate_many": call(
         dyn.simulate_many, ARM, [[0.1]], [[0.0]], 0.02, "rk4", t0=0.0, t_span=None, t_eval=None, tau=0.0,

@@ -96,10 +96,6 @@ class Run(HoldsNodes):
         """The equations of the model, and the force that is applied to it."""
         return with_applied(self._model, self._tau, self._values)
 
-    def equations(self, numbers: Mapping[str, float]) -> Problem:
-        """The equations in the states that are stepped, with these numbers built in."""
-        return in_form(derive(self.applied.model, numbers), self._form)
-
     @cached_property
     def _equations(self) -> RunEquations:
         applied = self.applied

@@ -16,7 +16,7 @@ from cgraph.extend import Builder, topological
 
 from ...equations.state_equation import FORMS, StateInputs, state_inputs
 from ...equations.states.initial_value import initial_values
-from ...integrators import Problem, quantity
+from ...integrators import Problem, derive, in_form, quantity
 from ...systems.arguments import TIME, Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
 from ...systems.ode_system import OdeSystem
@@ -221,10 +221,10 @@ class Differentiation:
             cause = "a SampledController calls Python, which has no derivative"
             raise TypeError(f"tau must be numbers or a controller in closed form: {cause}")
         self._losses, self._parameters, self._wrt, self._events = losses, parameters, wrt, as_events(events)
-        self._many, self._closed = many, callable(tau)
+        self._many, self._closed, self._form = many, callable(tau), options.pop("form", FORMS[0])
         own = _with_loss_parameters(as_equations(model), parameters, *losses)
         t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
-        form, rows = options.pop("form", FORMS[0]), None if callable(tau) else real_array("tau", tau)
+        rows = None if callable(tau) else real_array("tau", tau)
         rows = rows if rows is not None and rows.ndim == 2 + many else None
         if method is None:
             method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
@@ -233,7 +233,7 @@ class Differentiation:
         if rows is not None:
             _require_rows(rows, len(state_inputs(own).applied), settings, many=many, watched=bool(self._events))
         self._rows, self._options = rows if many or rows is None else rows[None], settings
-        self._run = Run(own, settings, tau if rows is None else 0.0, self._events, form, False, (), parameters)
+        self._run = Run(own, settings, tau if rows is None else 0.0, self._events, self._form, False, (), parameters)
 
     def __call__(self, q: ArrayLike, qd: ArrayLike | None) -> Motions:
         """The motions."""
@@ -245,8 +245,8 @@ class Differentiation:
         forced = rows is not None or TORQUE in wrt or not start.varied.keys().isdisjoint(names)
         forces = names if forced or any([start.bound[name] != 0.0 for name in names]) else ()
         free = {*forces, *wrt, *(self._parameters or ())}  # what a caller changes from call to call stays an input
-        derived = run.equations({name: value for name, value in start.bound.items() if name not in free})
-        equations, columns = motion_equations(derived, len(forces)), start.bound | start.varied
+        derived = derive(run.applied.model, {name: value for name, value in start.bound.items() if name not in free})
+        equations, columns = motion_equations(in_form(derived, self._form), len(forces)), start.bound | start.varied
         numbers = np.empty((len(forces) + len(equations.names), count))
         for row, name in zip(numbers, [*forces, *equations.names], strict=True):
             row[:] = columns[name]
