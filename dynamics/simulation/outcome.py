@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,6 @@ from ..integrators import Problem
 from .estimates.error_estimate import RunEstimate
 from .events.event import EventProgram
 from .events.event_log import Happening
-from .progress_bar import Progress
 from .run_options import SMALL_MEMORY, TABLES, Span, room
 from .stepper import Stepper
 from .steps.dense_output import StepBlock
@@ -29,6 +29,8 @@ REACHED = "reached t_end"
 LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it; of a velocity the same
 SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller
 INTERRUPTED = "interrupted"  # what the message of a run that Ctrl-C ended begins with
+
+QUIET = 1.0  # s: a run shorter than this has no progress line
 
 
 class MotionError(ValueError):
@@ -169,6 +171,38 @@ class MotionSteps:
             raise MotionError(f"the motion {self._run.status}")
 
 
+class Progress:
+    """A progress line on the terminal for runs that take long.
+
+    `with Progress("simulate", total=10.0) as progress: progress(3.2)`; show: None asks if it is a terminal.
+    """
+
+    def __init__(
+        self, what: str, total: float, show: bool | None = None, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self.what, self.total, self.clock = what, total, clock
+        self.show = sys.stderr.isatty() if show is None else show
+        self.start = self.last = clock()
+        self.written = False
+
+    def __call__(self, done: float) -> None:
+        """Say how far the run is, at most ten times a second."""
+        now = self.clock()
+        if self.show and now - self.start >= QUIET and now - self.last >= 0.1:
+            self.last, self.written = now, True
+            share = min(done / self.total, 1.0) if self.total else 1.0
+            bar = "#" * int(24 * share)
+            sys.stderr.write(f"\r{self.what} [{bar:24}] {share:4.0%}  {now - self.start:.0f} s")
+            sys.stderr.flush()
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self.written:
+            sys.stderr.write("\n")
+
+
 class Recorder:
     """The rows of a trajectory that starts with x: every step, or the states at the times of a span."""
 
@@ -179,7 +213,7 @@ class Recorder:
         self._parts = [(np.array([span.t0])[:at_start], np.array([x])[:at_start])]  # times and states
         self.size = 0  # bytes
 
-    def add(self, block: StepBlock) -> None:
+    def record(self, block: StepBlock) -> None:
         """The rows of these steps."""
         if self._times is None:
             self._append(block.t, block.x)
@@ -217,8 +251,8 @@ def outcome(
         with np.errstate(all="ignore"):
             for block in run.blocks(x, span):
                 made = block if steps is None else run.with_dense(block)
-                recorder.add(made)
-                estimate.add(made)
+                recorder.record(made)
+                estimate.note(made)
                 if steps is not None:
                     steps.append(made)
                     kept += made.nbytes

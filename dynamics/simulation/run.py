@@ -31,11 +31,11 @@ from .outcome import (
     MotionEnd,
     MotionError,
     MotionSteps,
+    Progress,
     outcome,
     split_crossings,
     unreached_momenta,
 )
-from .progress_bar import Progress
 from .run_options import TABLES, RunOptions, Span, Steps, require_room
 from .stepper import Stepper, stepper_of
 from .steps.dense_output import Solution, StepBlock

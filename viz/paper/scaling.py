@@ -11,7 +11,7 @@ import cgraph as cg
 from dynamics import inverse_dynamics, planar_arm
 from dynamics.experiments.text_table import csv_text
 from dynamics.experiments.timing import exponent, spent
-from dynamics.simulation.progress_bar import Progress
+from dynamics.simulation.outcome import Progress
 
 from ..pages.document import Block, Paragraph, Table
 from ..pages.formulation_table import COLORS, TITLES

@@ -100,7 +100,7 @@ def recorded(run: Stepper, start: Array, span: Span) -> Array:
     begin = time.perf_counter()
     with np.errstate(all="ignore"):
         for block in run.blocks(start, span):
-            recorder.add(block)
+            recorder.record(block)
             if time.perf_counter() - begin > 2 * LONGEST_RUN:
                 break
     states = recorder.table()[1]

@@ -22,8 +22,7 @@ from ...integrators import derive, in_form
 from ...systems.model import Model
 from ..applied_force import SampledController, with_applied
 from ..events.event import Event, as_events, event_program
-from ..outcome import split_crossings, unreached_momenta
-from ..progress_bar import Progress
+from ..outcome import Progress, split_crossings, unreached_momenta
 from ..run_options import METHOD, Options, RunOptions, known_options, require_room, time_span
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted

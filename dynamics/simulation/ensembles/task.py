@@ -247,7 +247,7 @@ class Task:
         whole, columns = run.to_end(own, states[0], stopped)
         for legs, each in zip(others, states[1:], strict=True):
             LaneRun(lanes, program, options, x * ASIDE, p).to_end(legs, each, stopped)
-        watch.add(instants_of(self._grids, numbers[0][1:]), states[0][:, 1:])
+        watch.see(instants_of(self._grids, numbers[0][1:]), states[0][:, 1:])
         rows[:] = states[0][:, numbers[0].searchsorted(self._at_rows)]
         states[0] = states[0][:, numbers[0].searchsorted(beside.numbers)]
         return whole, columns | error_estimates(program, options, beside, watch, self._steps, states)

@@ -90,7 +90,7 @@ def unresolved(rate: Graph) -> tuple[Graph | None, int]:
     timed = {node for node in rate.inputs if node.name == TIME}
     for node in rate.nodes:
         if not timed.isdisjoint(node.args):
-            timed.add(node)
+            timed |= {node}
     waves = dict.fromkeys(node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed)
     branches = [BRANCHES[node.op.name](node, *node.args) for node in rate.nodes if node.op.name in BRANCHES]
     found = [*waves, *branches]
@@ -106,7 +106,7 @@ class Watch:
         self.bent = np.full(len(x), np.nan)  # start of the first step that passes a jump or a kink [s]
         self._p, self._seen = p, [(np.array([t]), x[:, None])]
 
-    def add(self, t: Array, x: Array) -> None:
+    def see(self, t: Array, x: Array) -> None:
         """The next states, (k, r, m), at times t (r,)."""
         if self._graph is not None:
             self._seen.append((t, x))
@@ -189,7 +189,7 @@ class _Rows:
         self.x[0], self.count = x, 1  # of the instants that it has come to
         self._times = self._forth * t - SAME_INSTANT * np.spacing(np.abs(t).max())  # for those at which steps end
 
-    def add(self, block: StepBlock) -> None:
+    def keep(self, block: StepBlock) -> None:
         """The next steps."""
         ends = self._forth * block.t
         here = slice(self.count, int(np.searchsorted(self._times, ends[-1], side="right")))
@@ -211,12 +211,12 @@ class RunEstimate:
             self._watch = Watch(run.program.rate, np.array([run.parameters]), span.t0, x[None])
             self.seconds = time.perf_counter() - begin
 
-    def add(self, block: StepBlock) -> None:
+    def note(self, block: StepBlock) -> None:
         """The next steps of the run."""
         if self._rows is not None and len(block.t):
             begin = time.perf_counter()
-            self._rows.add(block)
-            self._watch.add(block.t, block.x[None])
+            self._rows.keep(block)
+            self._watch.see(block.t, block.x[None])
             self.seconds += time.perf_counter() - begin
 
     def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
@@ -229,7 +229,7 @@ class RunEstimate:
         for stretches, _ in beside.runs:
             other = _Rows(beside.t[:count], self._x)
             for block in run.beside(stretches).blocks(self._x * ASIDE, self._span):
-                other.add(block)
+                other.keep(block)
                 if other.count == count:
                     break
             rows.append(other.x[None])

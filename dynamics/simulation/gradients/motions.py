@@ -172,7 +172,7 @@ class Motions:
         recorder = Recorder(x, options)
         with np.errstate(all="ignore"):
             for block in run.blocks(x, options):
-                recorder.add(block)
+                recorder.record(block)
         if run.status:
             raise MotionError(f"the motion did not reach t_end, {run.status}")
         return replace(self, steps=self._cut(recorder.table()[0], run.log, bool(run.event)), said=tuple(run.warnings))

@@ -6,7 +6,7 @@ from unittest.mock import patch
 import pytest
 from pytest import mark, raises
 
-from dynamics.simulation.progress_bar import Progress
+from dynamics.simulation.outcome import Progress
 
 
 class Clock:
