@@ -122,17 +122,22 @@ class Functions:
     def total(self, count: int) -> str:
         """y = x[0] + .. + x[count - 1], added up in this order from 0."""
 
+        t = self.arithmetic.type
+
         def text(ir: FunctionWriter, _: str) -> None:
-            ir.store_at(ir.number(0.0), "%out0")
-            with ir.loop(0, count) as i:
-                term = ir.load_at(ir.at("%in0", i))
-                ir.store_at(ir.value(f"fadd {ir.type} {ir.load_at('%out0')}, {term}"), "%out0")
+            if not count:
+                ir.store_at(ir.number(0.0), "%out0")
+                return
+            with ir.loop(0, count) as i:  # the sum is in a register of the processor
+                ir.line(f"{i}.sum = phi {t} [ {ir.number(0.0)}, %start ], [ {i}.total, %{i[1:]}.again ]")
+                ir.line(f"{i}.total = fadd {t} {i}.sum, {ir.load_at(ir.at('%in0', i))}")
+            ir.store_at(f"{i}.total", "%out0")
 
         return self._define(("total", count), "total", text, self.arithmetic, 1, 1)
 
-    def take(self, table: Sequence[int], places: Sequence[int] = ()) -> str:
-        """y[i] = x[table[i]], or y[places[i]]; where these are all, in order, they are left out."""
-        tables = [table] if tuple(places) in ((), tuple(range(len(table)))) else [table, places]
+    def take(self, table: Sequence[int], places: Sequence[int]) -> str:
+        """y[places[i]] = x[table[i]]; places that are all, in order, are left out."""
+        tables = [table] if tuple(places) == tuple(range(len(table))) else [table, places]
 
         def text(ir: FunctionWriter, name: str) -> None:
             for k, numbers in enumerate(tables):
@@ -215,11 +220,6 @@ class Writer(FunctionWriter):
     def store(self, value: str, register: str, k: int = 0) -> None:
         """register[k] = value, a number."""
         self.store_at(value, self.place(register, k))
-
-    def fill_with_nan(self, register: str) -> None:
-        """register = NaN, every number of it: all bits are 1."""
-        size = self.registers[register] * self.size
-        self.line(f"call void @llvm.memset.p0.i64(ptr {self.pointers[register]}, i8 -1, i64 {size}, i1 false)")
 
     def positive(self, register: str) -> str:
         """Whether register > 0, where NaN is not; of lanes, whether any is."""
