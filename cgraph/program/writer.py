@@ -121,7 +121,6 @@ class Functions:
 
     def total(self, count: int) -> str:
         """y = x[0] + .. + x[count - 1], added up in this order from 0."""
-
         t = self.arithmetic.type
 
         def text(ir: FunctionWriter, _: str) -> None:

@@ -205,7 +205,8 @@ class Task:
                 self._beside = runs_beside(self._grids, program.order)
                 self._all_steps = unresolved(program.rate)[0] is not None  # are looked at
                 rows = self._steps + 1 if self._all_steps else rows + len(self._beside.t)
-            self.largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // (program.steps.width * rows)))
+            most = ROWS // (program.steps.width * rows)
+            self.largest = 0 if self._all_steps and most < VECTOR else min(LONGEST_CHUNK, max(VECTOR, most))
 
     def width(self, chunk: int | None, workers: Team, *, stored: bool = False) -> int:
         """Trajectories in a chunk: as asked for, or the shares of workers; in lanes whole vectors."""
