@@ -5,8 +5,6 @@ free points are, in order; and between walls, where points on a line are that is
 what happens first.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Random motions, drawn from a seed: Lagrangians of eight families; starts at 0, chains, and forces that jump."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """The random Lagrangians as exactly as float64 has them, by our Taylor method and by heyoka's, in turns."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from statistics import geometric_mean

@@ -1,7 +1,5 @@
 """Trust: random motions judged by their exact answers, by default arguments."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections import Counter

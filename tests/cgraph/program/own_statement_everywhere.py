@@ -3,8 +3,6 @@
 z -> f z, and u -> f* u where Re z > 0, n times; complex numbers in Python say what is right.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

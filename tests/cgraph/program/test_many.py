@@ -1,7 +1,5 @@
 """`many`: memories side by side take the course of each of them, to the bit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

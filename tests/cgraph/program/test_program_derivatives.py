@@ -1,7 +1,5 @@
 """Derivatives of programs: laws on random programs with branches, solves and fixed points."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Ends of many prepared motions are the last rows of `simulate_many`, to the bit, also where motions stop early."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,10 +1,8 @@
-"""The estimated error of random runs of equal steps beside the true one: kinks, jumps, few rows.
+"""The estimated error of random runs of equal steps beside the true one: kinks, few rows.
 
 The motions are piecewise linear, and so have closed forms: eigenvectors between the instants at which a force changes,
 which bisection finds.
 """
-
-from __future__ import annotations
 
 import math
 import warnings
@@ -23,9 +21,6 @@ from tests.slow import slow
 
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
 KINDS = ["kink", "rows"]
-JUMPS = ["potential", "friction", "switch"]  # of the force, across a plane of positions, at rest, or in time
-WRITTEN = [cg.abs, lambda x: cg.maximum(x, -x), lambda x: cg.where(x > 0.0, x, -x), lambda x: x * cg.sign(x)]
-SHARES = [0.0, 0.25, 0.5, 1.0 / 3.0, 0.285, 0.9]  # of a step, by which a leg is longer than whole steps
 LEGS = 200  # more are no motion for equal steps: a contact that stays
 UNDER, OVER = 10.0, 1e3  # by which an estimate may be too small unless it is said, and too large
 EXACT = 1e-13  # of the closed forms; smaller errors are not compared
@@ -50,30 +45,15 @@ class Flow:
         return self.rest + (vectors @ share).real.T
 
 
-@dataclass(frozen=True)
-class Fall:
-    """q'' = force."""
-
-    force: Array
-
-    def at(self, y: Array, t: Any) -> Array:
-        """(T, m) at times t (T,) after y (m,)."""
-        (q, qd), t = np.split(y, 2), np.atleast_1d(t)[:, None]
-        return np.hstack([q + qd * t + 0.5 * self.force * t**2, qd + self.force * t])
-
-
 class RandomRun:
     """Masses on springs, with a spring that acts on one side of a plane besides.
-
-    Or, where `kind` is one of `JUMPS`, a force that is turned, with or without springs; legs then are whole steps and a
-    share of one.
 
     Lengths are in units of 1e-6 to 1e6 m, times of 1e-6 to 1e6 s; both are 1 in the closed form.
     """
 
-    def __init__(self, seed: int, kind: str = "") -> None:
+    def __init__(self, seed: int) -> None:
         rng = np.random.default_rng([seed, 77])
-        self.kind, self.n = kind or KINDS[seed % len(KINDS)], int(rng.integers(1, 4))
+        self.kind, self.n = KINDS[seed % len(KINDS)], int(rng.integers(1, 4))
         n, square = self.n, rng.normal(size=(self.n, self.n))
         self.stiffness = square @ square.T + np.diag(rng.uniform(0.5, 2.0, n))
         self.damping = rng.choice([0.0, 0.1], n) * rng.uniform(0.0, 1.0, n)
@@ -88,18 +68,6 @@ class RandomRun:
         self.plane, self.extra = 0.3 * rng.normal(), rng.uniform(0.5, 8.0)
         few = self.kind == "rows" or rng.random() < 0.5
         self.rows = np.sort(rng.uniform(0.1, 1.0, rng.integers(1, 4))) * self.t_end if few else None
-        if self.kind in JUMPS:
-            if self.kind != "friction" and rng.random() < 0.5:
-                self.stiffness, self.damping = np.zeros((n, n)), np.zeros(n)
-            self.rows, self.written = None, WRITTEN[int(rng.integers(len(WRITTEN)))]
-            self.switches = np.sort(rng.uniform(0.0, self.t_end, rng.integers(1, 5)))
-            self.extra *= 0.1 if self.kind == "friction" else 1.0
-            lasted = np.diff([leg[0] for leg in self.legs])
-            if len(lasted) and lasted[-1] > self.dt:
-                self.dt = lasted[-1] / (math.floor(lasted[-1] / self.dt) + rng.choice(SHARES))
-            self.t_end = min(self.t_end, 4000.0 * self.dt)
-            self.t_end = self.dt * math.ceil(self.t_end / self.dt)  # else all steps are made shorter
-            del self.legs
 
     def simulated(self, rows: Array | None) -> dyn.Trajectory:
         """By equal steps, with rows at these times."""
@@ -112,21 +80,9 @@ class RandomRun:
             x, xd = [each * (1.0 / one) for each in q], [each * (second / one) for each in qd]
             total = sum(0.5 * v * v for v in xd)
             total = total - sum(0.5 * self.stiffness[i, j] * x[i] * x[j] for i in indices for j in indices)
-            if self.kind == "potential":
-                return total - self.extra * self.written(height(q))
             return total - 0.5 * self.extra * cg.maximum(height(q), 0.0) ** 2 if self.kind == "kink" else total
 
-        def turned(q: Any, qd: Any, t: Any) -> Any:
-            side = cg.sign(sum(self.normal[i] * qd[i] for i in indices))
-            if self.kind == "switch":
-                side = 1.0
-                for switch in self.switches:
-                    side = side * cg.where(t < switch * second, 1.0, -1.0)
-            return [-self.extra * self.normal[i] * side / one for i in indices]
-
         options: dict[str, Any] = {"dt": self.dt * second, "t_eval": None if rows is None else rows * second}
-        if self.kind in ("friction", "switch"):
-            options["tau"] = turned
         names = [f"x{i}" for i in indices]
         system = dyn.System(lagrangian, names, damping=(self.damping * second / one**2).tolist())
         with warnings.catch_warnings():
@@ -135,15 +91,13 @@ class RandomRun:
             return dyn.simulate(system, *start, self.t_end * second, self.method, **options)
 
     @cached_property
-    def legs(self) -> list[tuple[float, Array, Flow | Fall]]:
+    def legs(self) -> list[tuple[float, Array, Flow]]:
         """The exact motion: from each of these times and states on it has this flow."""
         n, across = self.n, np.concatenate([self.normal, np.zeros(self.n)])
         t, y = 0.0, np.concatenate([self.q, self.qd])
         free = self._flow(self.stiffness, np.zeros(n))
         if self.kind == "rows":
             return [(t, y, free)]
-        if self.kind in JUMPS:
-            return self._turned_legs(y)
         pressed = self.stiffness + self.extra * np.outer(self.normal, self.normal)
         flows = [free, self._flow(pressed, self.extra * self.plane * self.normal)]
         above = int(across @ y > self.plane)
@@ -156,35 +110,12 @@ class RandomRun:
             legs.append((t, y, flows[above]))
         return legs
 
-    def _turned_legs(self, y: Array) -> list[tuple[float, Array, Flow | Fall]]:
-        """Those of a force that is turned where the plane is crossed, the velocity is, or at times."""
-        nothing = np.zeros(self.n)
-        across, level = (self.normal, nothing), self.plane
-        if self.kind == "friction":
-            across, level = across[::-1], 0.0
-        turned, t = np.concatenate(across), 0.0
-        side = 1.0 if self.kind == "switch" or turned @ y > level else -1.0
-        flows = {each: self._flow(self.stiffness, -each * self.extra * self.normal) for each in (1.0, -1.0)}
-        legs = [(t, y, flows[side])]
-        while len(legs) < LEGS:
-            if self.kind == "switch":
-                after = None if len(legs) > len(self.switches) else self.switches[len(legs) - 1] - t
-            else:
-                after = self._crossing(flows[side], y, turned * side, level * side, self.t_end - t)
-            if after is None:
-                break
-            t, y, side = t + after, flows[side].at(y, after)[0], -side
-            legs.append((t, y, flows[side]))
-        return legs
-
-    def _flow(self, stiffness: Array, force: Array) -> Flow | Fall:
+    def _flow(self, stiffness: Array, force: Array) -> Flow:
         n = self.n
-        if not stiffness.any():
-            return Fall(force)
         a = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -np.diag(self.damping)]])
         return Flow(a, np.concatenate([np.linalg.solve(stiffness, force), np.zeros(n)]))
 
-    def _crossing(self, flow: Flow | Fall, y: Array, across: Array, level: float, most: float) -> float | None:
+    def _crossing(self, flow: Flow, y: Array, across: Array, level: float, most: float) -> float | None:
         """When `across . y`, above a level, falls below it."""
         step = 0.005 / self.fastest
         times = step * np.arange(1.0, most / step + 2.0)
@@ -230,22 +161,3 @@ def test_no_error_of_equal_steps_is_far_from_its_estimate(seed: int) -> None:
         every = random.simulated(None)
         assert every.success
         assert said <= OVER * (random.error(every) + EXACT)
-
-
-@mark.parametrize("kind", JUMPS)
-@mark.parametrize("seed", [7, 60, 99, *slow(*range(60))])
-def test_no_jump_of_the_force_is_missed_by_all_runs_beside(seed: int, kind: str) -> None:
-    """Steps of h, 2h and 4h often agree: a jump in the outer parts of all three is as if it were at their end.
-
-    Where a step ends at the jump, it misses nothing, and those beside do.
-    """
-    random = RandomRun(seed, kind)
-    run = random.simulated(None)
-    if not run.success or len(random.legs) == LEGS:
-        return
-    said, true = run.stats.error, random.error(run)
-    assert said is not None
-    assert said >= true / UNDER - EXACT or run.stats.warnings
-    steps = np.array([leg[0] for leg in random.legs[1:]]) / random.dt
-    if math.isfinite(said) and (np.abs(steps - np.rint(steps)) > 1e-6).all():
-        assert said <= OVER * (true + EXACT)

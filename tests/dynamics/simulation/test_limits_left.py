@@ -1,7 +1,5 @@
 """Limits that a motion leaves are found between its rows, as its solution at very many instants has them."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

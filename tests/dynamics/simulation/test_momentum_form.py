@@ -1,7 +1,5 @@
 """Runs in coordinates and momenta: all that a run in velocities has, and the same numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parameters may be called like what the library calls its variables: no name means anything else for that."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable, Iterator
