@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import pickle
+import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from pathlib import Path
@@ -34,6 +35,7 @@ from ..statements.call import Call
 from .derivative import BoundFunction, Chosen, ColoredMatrix, Derivatives, Ready
 
 BACKENDS = ("auto", "python", "numpy", "llvm")
+LARGE_GRAPH = 1_000_000  # nodes; beyond, making machine code takes longer than most callers gain
 Inputs = str | Node | Sequence[str | Node] | None
 
 
@@ -93,7 +95,8 @@ class Compiled(BoundFunction):
     def bind(self, x: Array, y: Array) -> Callable[[], None]:
         """A function of nothing that reads x, (n_in,), and writes y, (n_out,): the fastest call there is.
 
-        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it.
+        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it,
+        and Python's other threads wait meanwhile.
         Raises GraphError unless both are contiguous float64 in these shapes, y can be written and they share no memory.
         """
         require_memory("x", x, (self.n_in,))
@@ -128,7 +131,8 @@ class Compiled(BoundFunction):
     def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
 
-        An entry of x_dot that is zero counts for nothing, also where an operation has no slope in it.
+        An entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor
+        that is infinite or NaN it is NaN.
 
         Parameters
         ----------
@@ -195,7 +199,8 @@ class Compiled(BoundFunction):
         x : array_like, (n_in,) or (N, n_in)
             The point, or points, a row each; of points in columns, as `batch` takes them, it is `jacobian(X.T)`.
         wrt : optional
-            The inputs to differentiate by, n_in of them, in this order; by default all.
+            The inputs to differentiate by, n_in of them, in this order; by default all. With displacements as inputs,
+            a quaternion q + G(q) xi, the columns of these at xi = 0 are those of displacements.
         sparse : bool
             Give a scipy.sparse.csr_array with the entries of `cg.sparsity`; of N points a list of them.
         threads : int, optional
@@ -385,14 +390,18 @@ def compile(
         What to compile.
     backend : {"auto", "llvm", "python", "numpy"}
         "llvm": machine code (extra `native`). "python": generated Python over floats. "numpy": generated NumPy over
-        arrays. "auto": machine code where llvmlite is installed and the C library has all functions of the graph, else
-        generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`.
+        arrays. "auto": machine code where llvmlite is installed, the C library has all functions of the graph and that
+        has at most 1 000 000 nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`; a
+        RuntimeWarning says so if it is the size. Beyond 60 000 nodes machine code is made in two thirds of the time
+        for a node, and takes twice as long to run.
     fast : bool
-        Machine code may also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero.
+        Machine code may also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero;
+        NaN and infinities keep their meaning.
     fma : bool
         May round a product and the sum it goes into once instead of twice, and take sines, cosines, exponentials and
         logarithms from polynomials (within 2 ulp), NumPy its own functions. Without, `fn(x)` and `fn.batch(X)` agree
-        with `graph.evaluate` at a point to the last bit, in every back end.
+        with `graph.evaluate` at a point to the last bit, in every back end; batches then call the C library for each
+        column.
     cache : bool or path
         Keep machine code on disk for the next process, and read it from there: True, in the platform's folder for
         caches (`$XDG_CACHE_HOME/cgraph`, `~/.cache/cgraph`, ...), or the path of a folder, `~` the home, that nobody
@@ -432,7 +441,15 @@ def compile(
     else:
         raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r:.60}")
     options = {"fast": fast, "fma": fma, "cache": kept}
-    if backend in ("auto", "llvm"):
+    large = backend == "auto" and len(graph.nodes) > LARGE_GRAPH
+    if large:
+        warnings.warn(
+            f"a graph of {len(graph.nodes)} nodes is compiled to generated Python, as it has more than {LARGE_GRAPH}; "
+            "backend='llvm' makes machine code of it",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    if backend == "llvm" or (backend == "auto" and not large):
         try:
             ready = partial(NativeRunner, fast=fast, fma=fma, cache=open_cache(kept))
             return Compiled(graph, backend, options, ready, ready)

@@ -174,6 +174,13 @@ def test_a_batch_in_which_rows_lie_apart_by_a_power_of_two():
     assert same(function.batch(points), np.array([function(point) for point in points.T]).T)
 
 
+def test_auto_says_when_a_graph_is_too_large_for_machine_code(monkeypatch):
+    monkeypatch.setattr(functions, "LARGE_GRAPH", 5)
+    with pytest.warns(RuntimeWarning, match=r"has more than 5; backend='llvm' makes machine code"):
+        function = cg.compile(chain())
+    assert function.source == cg.compile(chain(), "python").source
+
+
 @pytest.mark.parametrize("count", [1000, 4000])
 def test_no_function_grows_with_the_graph(count):
     """On some graphs LLVM's time is quadratic in the length of a function."""
