@@ -325,7 +325,8 @@ class Compiled(BoundFunction):
     def _products(
         self, x: ArrayLike, name: str, directions: ArrayLike, wrt: Inputs, threads: int | None, *, reverse: bool
     ) -> Array:
-        points, rows, chosen = self._points(x), real_array(name, directions), self._chosen(wrt)
+        points, rows = self._points(x), real_array(name, directions)
+        chosen = None if wrt is None else self._chosen(wrt)
         width, found = self.n_in if chosen is None else len(chosen), self.n_out
         if reverse:
             width, found = found, width
@@ -338,8 +339,10 @@ class Compiled(BoundFunction):
             each = f"({total}, {width}), ({total}, k, {width}) or ({width},) for {total} points"
             wanted = each if leading else f"(k, {width}) or ({width},)"
             raise GraphError(f"{name} must have shape {wanted}, got {rows.shape}")
-        result = np.zeros((*rows.shape[:-1], found))
-        if self.n_in and result.size:
+        result = np.empty((*rows.shape[:-1], found))
+        if not self.n_in:
+            result[...] = 0.0
+        elif result.size:
             products = self._derivatives.products(chosen, reverse)
             if rows.ndim == points.ndim:  # a direction for each point
                 products.write(points, rows[..., None, :], result[..., None, :], count)
@@ -348,7 +351,7 @@ class Compiled(BoundFunction):
         return result
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
-        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
+        count = thread_count(threads)
         if not require_flag("sparse", sparse):
             return matrix.at(points, True, count)
         module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
