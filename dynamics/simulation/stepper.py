@@ -313,8 +313,6 @@ class EqualStepper(Stepper):
         rows = self.runner.run(self._memory, steps, 1 if looked else max(1, steps))[0]
         names, x = self.program.components, self.runner.read(failed, "x")
         reason = nonfinite(names, x) or unsolved(names, self.x, x)
-        if "singular" in self._at and (number := int(failed[self._at["singular"]])):
-            reason = f"{names[number - 1]} has an inertia that is not positive"
         self.status = f"stopped at t = {failed[self._at['t']]:.6g} s: {reason}"
         self._set(evaluations=failed[self._at["evaluations"]])
         return rows
