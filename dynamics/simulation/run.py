@@ -6,7 +6,7 @@ import math
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -36,7 +36,7 @@ from .outcome import (
     split_crossings,
     unreached_momenta,
 )
-from .run_options import TABLES, RunOptions, Span, Steps, require_room
+from .run_options import TABLES, Span, Steps, require_room
 from .stepper import Stepper, stepper_of
 from .steps.dense_output import Solution, StepBlock
 from .steps.equal_steps import step_count
@@ -238,10 +238,8 @@ class Run(HoldsNodes):
             p[:, k] = start.varied[name] if name in start.varied else start.bound[name]
 
         def task() -> Task:
-            parts = [(part, each.name) for part in (span, self._options) for each in fields(part) if each.init]
-            options = RunOptions(**{name: getattr(part, name) for part, name in parts})
-            options.check(span, run._equations.problem.states)
-            return Task(step_program(problem, options.integrator, dense=False), options, len(p))
+            self._options.check(span, run._equations.problem.states)
+            return Task(step_program(problem, self._options.integrator, dense=False), self._options, span, len(p))
 
         x = ends_of(
             run._made((len(p), span.t0, span.t_end), task), converted(problem.momentum, span.t0, start.x, p), p, workers

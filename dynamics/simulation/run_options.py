@@ -173,6 +173,13 @@ class Steps:
         moves = self.adaptive or self.step >= RESOLUTION * max(abs(t0), abs(t_end))
         return moves and t0 != t_end and math.isfinite(t_end - t0)
 
+    def row_times(self, span: Span) -> Array:
+        """Times of the rows of equal steps: those of the span, or every step, (T,)."""
+        if span.times is not None:
+            return span.times
+        count = step_count(span.length, self.step)
+        return np.append(span.t0 + (span.t_end - span.t0) / count * np.arange(count), span.t_end)
+
     def check(self, span: Span, states: tuple[str, ...]) -> None:
         """Raises ValueError where atol has not one number for each state, or equal steps would not move the time."""
         m, shape = len(states), np.shape(self.absolute)
@@ -214,23 +221,6 @@ class Span:
         """Instants that equal steps have to meet [s]: t0, t_eval and t_end."""
         met = {self.t0, self.t_end, *([] if self.times is None else self.times.tolist())}
         return sorted(met, reverse=self.direction < 0.0)
-
-
-@dataclass(frozen=True)
-class RunOptions(Steps, Span):
-    """How many runs step and when they are."""
-
-    def __post_init__(self) -> None:
-        Steps.__post_init__(self)
-        Span.__post_init__(self)
-
-    @property
-    def row_times(self) -> Array:
-        """Times of the rows of equal steps, t_eval or every step, (T,)."""
-        if self.times is not None:
-            return self.times
-        count = step_count(self.length, self.step)
-        return np.append(self.t0 + (self.t_end - self.t0) / count * np.arange(count), self.t_end)
 
 
 def known_options(options: Mapping[str, Any], without: Sequence[str] = ()) -> Mapping[str, Any]:

@@ -17,7 +17,7 @@ from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.integrators import METHODS
 from dynamics.multiprecision import Reference, ReferenceFailedError
 from dynamics.multiprecision.solution import from_text
-from dynamics.simulation.run_options import METHOD, RunOptions
+from dynamics.simulation.run_options import METHOD, Steps
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import Trajectory
 from tests.bench.tables import Table
@@ -145,7 +145,7 @@ def _excess(task: AccuracyTask, truth: Answer, run: Trajectory) -> float:
     size = np.array(truth.size)
     error = np.abs(truth.end.deviation(np.hstack([run.q[-1:], run.qd[-1:]]))[0])
     relative = np.divide(error, size, out=np.where(error > 0.0, np.inf, 0.0), where=size > 0.0)
-    tolerance = RunOptions(task.t_end, run.stats.method).relative
+    tolerance = Steps(run.stats.method).relative
     return float(np.max(relative) / (tolerance * truth.growth))
 
 

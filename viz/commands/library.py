@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dynamics.multibody.changes.pruning import PruneResult
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
     from dynamics.simulation.limits_left import limits_left
-    from dynamics.simulation.run_options import RunOptions
+    from dynamics.simulation.run_options import Steps
     from dynamics.verification.certificate import certify
 
     from .. import theme

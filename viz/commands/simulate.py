@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
         _shared.check_writable(options.csv)
     elif options.every is not None:
         raise ValueError("--every goes with --csv: it says how often the table has a row")
-    if options.dt is not None and library.RunOptions(1.0, options.method).adaptive:
+    if options.dt is not None and library.Steps(options.method).adaptive:
         said = f"{options.method} chooses its steps, to the error --rtol"
         raise ValueError(f"--dt goes with methods of equal steps, such as --method rk4; {said}")
     scene, _ = started(options)

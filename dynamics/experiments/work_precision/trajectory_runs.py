@@ -17,7 +17,7 @@ from cgraph._shared import Array
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
 from ...simulation.outcome import Recorder
-from ...simulation.run_options import RunOptions, Span
+from ...simulation.run_options import Span, Steps
 from ...simulation.stepper import Stepper, stepper
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
 from ..accuracy_task import AccuracyTask
@@ -127,28 +127,27 @@ class Ours(Solver):
         program = step_program(self.problem, self.method, dense=self.method.adaptive)
         return compile_steps(program, "auto", True)
 
-    def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> RunOptions:
+    def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> tuple[Steps, Span]:
         t_end = self.task.t_end
         if self.method.adaptive:
-            return RunOptions(t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
-        return RunOptions(t_end, self.name, dt=t_end / knob, t_eval=times, max_steps=max_steps)
+            return Steps(self.name, rtol=knob, atol=self.absolute(knob)), Span(t_end, t_eval=times)
+        return Steps(self.name, dt=t_end / knob, max_steps=max_steps), Span(t_end, t_eval=times)
 
     def ready(self, knob: float) -> Run:
         """The run to t_end, without dense output."""
         if self.kind == EQUAL and self._at_least(knob) > LONGEST_RUN:  # one that does not look at the clock on its way
             return Run(lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s"))
-        compiled, options = self._plain, self._options(knob, [self.task.t_end])
-        return Run(lambda: finished(stepper(compiled, options), self.start, options))
+        compiled, (steps, span) = self._plain, self._options(knob, [self.task.t_end])
+        return Run(lambda: finished(stepper(compiled, steps), self.start, span))
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
-        options = self._options(knob, [self.task.t_end], TRIAL)
-        run, begin = stepper(self._plain, options), time.perf_counter()
-        finished(run, self.start, options)
+        steps, span = self._options(knob, [self.task.t_end], TRIAL)
+        run, begin = stepper(self._plain, steps), time.perf_counter()
+        finished(run, self.start, span)
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
-        options = self._options(knob, self.task.times)
-        compiled = self._dense if options.between else self._plain
-        return recorded(stepper(compiled, options), self.start, options)
+        steps, span = self._options(knob, self.task.times)
+        return recorded(stepper(self._dense if span.between else self._plain, steps), self.start, span)

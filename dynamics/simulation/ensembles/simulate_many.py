@@ -23,7 +23,7 @@ from ...systems.model import Model
 from ..applied_force import SampledController, with_applied
 from ..events.event import Event, as_events, event_program
 from ..outcome import Progress, split_crossings, unreached_momenta
-from ..run_options import METHOD, Options, RunOptions, known_options, require_room, time_span
+from ..run_options import METHOD, Options, Span, Steps, known_options, require_room, time_span
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
 from ..steps.step_program import step_program
@@ -127,27 +127,28 @@ def simulate_many(
         raise TypeError(f"a SampledController may remember what it has seen, and so controls one run: {what}")
     folder = None if store is None else require_path("store", store)
     t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
-    run = RunOptions(t_end, method, t0=t0, t_eval=t_eval, **known_options(options, ["dense_output"]))
+    steps = Steps(method, **known_options(options, ["dense_output"]))
+    span = Span(t_end, t0=t0, t_eval=t_eval)
     watched, team = as_events(events), checked(workers)
     applied = with_applied(model, tau, parameters)
     start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
-    run.check(run, start.states)
-    if run.times is None and run.adaptive:
+    steps.check(span, start.states)
+    if span.times is None and steps.adaptive:
         how = "t_eval must say which times to record, or method='rk4' make equal steps"
         raise ValueError(f"{method!r} chooses the steps of each trajectory: {how}")
     if folder is None:
-        count = step_count(t_end - t0, run.step) + 1 if run.times is None else len(run.times)
+        count = step_count(span.length, steps.step) + 1 if span.times is None else len(span.times)
         what = f"{len(start.x)} trajectories of {count} rows of {start.x.shape[1]} numbers"
         require_room(8 * count * start.x.size, what, "record fewer times (t_eval), simulate fewer or name a store")
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
-    program = step_program(problem, run.integrator, dense=bool(watched) or run.between)
+    program = step_program(problem, steps.integrator, dense=bool(watched) or span.between)
     watch, nq = event_program(problem, watched), problem.nq
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    sent = replace(run, t_eval=run.row_times) if watched else run
-    task = Task(program, sent, len(start.x), watch if watched else None)
+    span = replace(span, t_eval=steps.row_times(span)) if watched else span
+    task = Task(program, steps, span, len(start.x), watch if watched else None)
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
     width, shape = task.width(chunk, team, stored=folder is not None), (len(x), task.count, x.shape[1])
@@ -158,7 +159,7 @@ def simulate_many(
             whole = _run_chunks(task, x, p, kept.width, team, kept)
 
     # Put the result together
-    times, rows = run.row_times, whole.rows
+    times, rows = task.times, whole.rows
     logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.columns["happened"]) if watched]
     for k in range(len(x)) if problem.missing is not None else ():
         missed = unreached_momenta(problem, times, rows[k], p[k], start=(t0, start.x[k], x[k]))

@@ -157,7 +157,7 @@ class Store:
 def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json]:
     """What makes a sweep of states x (N, m) with parameters p (N, ..): equations, options, and by which versions."""
     program, options, watched = task.program, task.options, task.events.events if task.events else ()
-    names = [field.name for field in fields(options) if field.init]
+    parts = [(part, field.name) for part in (task.span, options) for field in fields(part) if field.init]
     model = [problem.rate, problem.velocities, program.normalization]
     events = [graph for event in watched for graph in (event.values, event.reset)]
     known = {
@@ -165,10 +165,10 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "cgraph": cg.__version__,
         "llvmlite": [each.version for each in distributions(name="llvmlite")],
         "machine": platform.machine(),
-        **{name: getattr(options, name) for name in names if name != "progress"},
+        **{name: getattr(part, name) for part, name in parts if name != "progress"},
         "rtol": options.relative,
         "atol": np.asarray(options.absolute).tolist(),
-        "t_eval": _digest(options.row_times.tobytes()),
+        "t_eval": _digest(task.times.tobytes()),
         "names": [*program.components, *problem.parameters],
         "events": [f"{event.name} {event.direction} {event.terminal}" for event in watched],
         "model": _digest(*[cg.structure_hash(graph).encode() for graph in [*model, *events] if graph is not None]),

@@ -23,7 +23,7 @@ from ...integrators.step_control import DONE
 from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates, runs_beside, unresolved
 from ..events.event import EventProgram
 from ..outcome import INTERRUPTED, outcome
-from ..run_options import RunOptions
+from ..run_options import Span, Steps
 from ..stepper import BLOCK_TIME, HELD, ChosenStepper, Stepper, StoppedError, first_registers, span_registers, stepper
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import EqualSteps, Numbers, even_steps, instants_of
@@ -59,7 +59,7 @@ def lanes_of(program: StepProgram, backend: str, fma: bool) -> LaneCode | None:
     return runner(steps, backend, fma=fma).lane_code(clock, results, alike=program.adaptive)
 
 
-def fits_lanes(program: StepProgram, options: RunOptions, steps: int, count: int) -> bool:
+def fits_lanes(program: StepProgram, options: Steps, steps: int, count: int) -> bool:
     """Whether so many trajectories of so many equal steps each, or of chosen ones, without events, go in lanes."""
     if steps > options.max_steps or (program.adaptive and count < FEW_TRAJECTORIES):
         return False
@@ -94,13 +94,14 @@ def equal_legs(grids: Sequence[EqualSteps], numbers: Numbers) -> list[Leg]:
 class LaneRun:
     """k runs in lanes, from states x (k, m) with parameters p (k, ..)."""
 
-    def __init__(self, code: LaneCode, program: StepProgram, options: RunOptions, x: Array, p: Array) -> None:
-        self._code, self._program, self._options, self._x, self._most = code, program, options, x, PASSES
+    def __init__(self, code: LaneCode, program: StepProgram, options: Steps, span: Span, x: Array, p: Array) -> None:
+        self._code, self._program, self._options, self._span = code, program, options, span
+        self._x, self._most = x, PASSES
         self._memories = np.zeros((len(x), code.size))
         self._passes = np.zeros((len(x), 2), np.int64)  # how many each has made, and how many marks of its clock passed
         self._set({"x": x, "p": p, "fresh": 1.0})
         if program.adaptive:
-            self._set(first_registers(program, options) | span_registers(options) | {"lanes.toward": options.direction})
+            self._set(first_registers(program, options) | span_registers(span) | {"lanes.toward": span.direction})
 
     def to_end(self, legs: Sequence[Leg], rows: Array, stopped: Stopped) -> LaneRuns:
         """Go all legs, with states for rows (k, T, m), NaN from where a run stops on."""
@@ -111,7 +112,7 @@ class LaneRun:
                 self._set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
                 self._passes[:, 0], steps, longest = 0, steps + grid.steps, max(longest, abs(grid.h))
             made = self._rows(marks, stopped)
-            times = self._options.direction * marks
+            times = self._span.direction * marks
             block = _states(program, made, times) if program.adaptive else made[:, :, 1 : 1 + m]
             if (self._passes[:, 1] < len(marks)).any():
                 block[np.arange(len(marks)) >= self._passes[:, 1:]] = np.nan
@@ -187,17 +188,18 @@ class Task:
     """The function that runs chunks. It goes to other processes as it is, and is compiled there once."""
 
     def __init__(
-        self, program: StepProgram, options: RunOptions, many: int, events: EventProgram | None = None
+        self, program: StepProgram, options: Steps, span: Span, many: int, events: EventProgram | None = None
     ) -> None:
-        self.program, self.options, self.events, self._many = program, options, events, many
-        self.count = len(options.row_times)  # rows of a trajectory
+        self.program, self.options, self.span, self.events, self._many = program, options, span, events, many
+        self.times = options.row_times(span)
+        self.count = len(self.times)  # rows of a trajectory
         self.largest = 0  # trajectories in a chunk at most, if they go in lanes
         self._grids, self._all_steps, self._steps = list[EqualSteps](), False, 0
         self._beside: RunsBeside | None = None
         if not program.adaptive:
-            self._grids, numbers = even_steps(options.instants, options.step)
-            first = 0 if options.times is None else int(options.times[0] != options.t0)
-            self._at_rows = np.arange(self.count) if options.times is None else numbers[first : first + self.count]
+            self._grids, numbers = even_steps(span.instants, options.step)
+            first = 0 if span.times is None else int(span.times[0] != span.t0)
+            self._at_rows = np.arange(self.count) if span.times is None else numbers[first : first + self.count]
             self._steps = int(numbers[-1])
         if events is None and fits_lanes(program, options, self._steps, many):
             rows = self.count
@@ -240,14 +242,14 @@ class Task:
             lanes = lanes_of(program, options.backend, options.fma) if self.largest else None
         if lanes is None:
             return None
-        (own, *others), run = self._legs, LaneRun(lanes, program, options, x, p)
+        (own, *others), run = self._legs, LaneRun(lanes, program, options, self.span, x, p)
         if beside is None:
             return run.to_end(own, rows, stopped)
-        numbers, watch = self._numbers, Watch(program.rate, p, options.t0, x)
+        numbers, watch = self._numbers, Watch(program.rate, p, self.span.t0, x)
         states = [np.empty((len(x), len(each), x.shape[1])) for each in numbers]
         whole, columns = run.to_end(own, states[0], stopped)
         for legs, each in zip(others, states[1:], strict=True):
-            LaneRun(lanes, program, options, x * ASIDE, p).to_end(legs, each, stopped)
+            LaneRun(lanes, program, options, self.span, x * ASIDE, p).to_end(legs, each, stopped)
         watch.see(instants_of(self._grids, numbers[0][1:]), states[0][:, 1:])
         rows[:] = states[0][:, numbers[0].searchsorted(self._at_rows)]
         states[0] = states[0][:, numbers[0].searchsorted(beside.numbers)]
@@ -264,14 +266,14 @@ class Task:
     @cached_property
     def _legs(self) -> list[list[Leg]]:
         if self.program.adaptive:
-            options, first = self.options, int(self.options.row_times[0] == self.options.t0)  # that a step makes
-            return [[Leg(None, options.direction * options.row_times[first:], slice(first, self.count))]]
+            first = int(self.times[0] == self.span.t0)  # that a step makes
+            return [[Leg(None, self.span.direction * self.times[first:], slice(first, self.count))]]
         beside = [] if self._beside is None else [stretches for stretches, _ in self._beside.runs]
         return [equal_legs(*each) for each in zip([self._grids, *beside], self._numbers, strict=True)]
 
     def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Stopped) -> None:
         run: Stepper | None = None
-        has_end = self.options.row_times[-1] == self.options.t_end
+        has_end = self.times[-1] == self.span.t_end
         for k in which:
             with _lock:
                 compiled = compile_steps(self.program, self.options.backend, self.options.fma)
@@ -280,12 +282,12 @@ class Task:
                 run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
             run.set_parameters(p)
             if has_end and isinstance(run, ChosenStepper) and run.log is None:  # steps need not be looked at
-                if run.unseen(x, self.options):
+                if run.unseen(x, self.span):
                     part.reached(k, steps=run.steps, rejected=run.rejected, nfev=run.evaluations, dt=run.largest)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue
                 run = stepper(compiled, self.options, p, stopped=stopped)  # whose first blocks are short: it says when
-            stats, recorder = outcome(run, x, self.options)
+            stats, recorder = outcome(run, x, self.span)
             if stats.message.startswith(INTERRUPTED):
                 raise KeyboardInterrupt
             happened = () if run.log is None else run.log.happened

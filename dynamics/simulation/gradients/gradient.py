@@ -241,7 +241,7 @@ def gradient_many(
             first, text = min(each.items())
             text = f"{len(each)} of {count} motions {what}: motion {first}: {text}"
             warnings.warn(text, SimulationWarning, stacklevel=2)
-    t = motions.steps[0].t.copy() if motions.steps else np.array([settings.t0, settings.t_end])
+    t = motions.steps[0].t.copy() if motions.steps else np.array([motions.span.t0, motions.span.t_end])
     return MotionGradient(values, gradients, t, end[:, : problem.nq], end[:, problem.nq :], checkpoints)
 
 

@@ -25,7 +25,7 @@ from ..applied_force import SampledController
 from ..events.event import Event, EventProgram, WatchedEvent, as_events, event_program
 from ..outcome import MotionError, Recorder
 from ..run import Run
-from ..run_options import METHOD, Options, RunOptions, known_options, time_span
+from ..run_options import METHOD, Options, Span, Steps, known_options, time_span
 from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
@@ -97,7 +97,8 @@ class Motions:
     """
 
     equations: MotionEquations
-    options: RunOptions
+    options: Steps
+    span: Span
     x: Array
     tau: Array
     values: Array
@@ -167,11 +168,11 @@ class Motions:
         if self.steps:
             return self
         problem, options, p = self.problem, self.options, self.inputs[:, 0]
-        x = converted(problem.momentum, options.t0, self.x[:, 0], p)
+        x = converted(problem.momentum, self.span.t0, self.x[:, 0], p)
         run = stepper_of(problem, options, p.tolist(), events=self.events, dense=bool(self.events))
-        recorder = Recorder(x, options)
+        recorder = Recorder(x, self.span)
         with np.errstate(all="ignore"):
-            for block in run.blocks(x, options):
+            for block in run.blocks(x, self.span):
                 recorder.record(block)
         if run.status:
             raise MotionError(f"the motion did not reach t_end, {run.status}")
@@ -191,9 +192,9 @@ class Motions:
             if (resets or ended) and len(at) != 1:
                 names = ", ".join([each.name for each in at])
                 raise ValueError(f"events {names} happen at one instant, t = {t[-1]:.6g} s, which has no derivative")
-            count = 0 if options.adaptive else step_count(options.t_end - t[0], options.step)
+            count = 0 if options.adaptive else step_count(self.span.t_end - t[0], options.step)
             if len(t) > 1:
-                stretches.append(_stretch(t, count, options.t_end, at[0] if resets or ended else None))
+                stretches.append(_stretch(t, count, self.span.t_end, at[0] if resets or ended else None))
         return tuple(stretches)
 
 
@@ -229,18 +230,21 @@ class Differentiation:
         if method is None:
             method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
         plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
-        settings = (_options if plain else _options.__wrapped__)(t_end, method, t0, *options.items())
+        steps, self._span = (_options if plain else _options.__wrapped__)(t_end, method, t0, *options.items())
         if rows is not None:
-            _require_rows(rows, len(state_inputs(own).applied), settings, many=many, watched=bool(self._events))
-        self._rows, self._options = rows if many or rows is None else rows[None], settings
-        self._run = Run(own, settings, tau if rows is None else 0.0, self._events, self._form, False, (), parameters)
+            _require_rows(
+                rows, len(state_inputs(own).applied), steps, self._span, many=many, watched=bool(self._events)
+            )
+        self._rows, self._options = rows if many or rows is None else rows[None], steps
+        self._run = Run(own, steps, tau if rows is None else 0.0, self._events, self._form, False, (), parameters)
 
     def __call__(self, q: ArrayLike, qd: ArrayLike | None) -> Motions:
         """The motions."""
-        run, options, rows, inputs = self._run, self._options, self._rows, state_inputs(self._run.applied.model)
+        run, options, span, rows = self._run, self._options, self._span, self._rows
+        inputs = state_inputs(run.applied.model)
         constant = rows[:, 0] if self._many and rows is not None else run.applied.constant  # of rows the first ones
-        start = initial_values(run.applied.model, q, qd, constant, self._parameters, options.t0, many=self._many)
-        options.check(options, start.states)
+        start = initial_values(run.applied.model, q, qd, constant, self._parameters, span.t0, many=self._many)
+        options.check(span, start.states)
         wrt, names, count = self._names(inputs), inputs.applied, len(start.x)
         forced = rows is not None or TORQUE in wrt or not start.varied.keys().isdisjoint(names)
         forces = names if forced or any([start.bound[name] != 0.0 for name in names]) else ()
@@ -261,9 +265,9 @@ class Differentiation:
         steps: tuple[Stretch, ...] = ()
         if not (options.adaptive or watched):
             by_rows = rows is not None and options.dt is None
-            steps_count = len(tau) if by_rows else step_count(options.length, options.step)
-            steps = (_equal_stretch(options.t0, options.t_end, steps_count),)
-        return Motions(equations, options, start.x.T.copy(), tau, values, wrt, final, running, watched, steps)
+            steps_count = len(tau) if by_rows else step_count(span.length, options.step)
+            steps = (_equal_stretch(span.t0, span.t_end, steps_count),)
+        return Motions(equations, options, span, start.x.T.copy(), tau, values, wrt, final, running, watched, steps)
 
     def _names(self, inputs: StateInputs) -> tuple[str, ...]:
         """Names to differentiate by: by default the start, and the applied force where it is numbers."""
@@ -283,7 +287,7 @@ class Differentiation:
         return tuple(dict.fromkeys(names))
 
 
-def _require_rows(rows: Array, n: int, options: RunOptions, *, many: bool, watched: bool) -> None:
+def _require_rows(rows: Array, n: int, options: Steps, span: Span, *, many: bool, watched: bool) -> None:
     """Raises ValueError for rows of forces, one a step, that are of another shape or no steps."""
     if options.adaptive or watched:
         needed = " without events" if watched else f": method {options.method!r} chooses its steps"
@@ -293,7 +297,7 @@ def _require_rows(rows: Array, n: int, options: RunOptions, *, many: bool, watch
         raise ValueError(f"tau must have shape {shapes} with n = {n} velocities, got {rows.shape}")
     if not np.isfinite(rows).all():
         raise ValueError("tau must be finite")
-    if options.dt is not None and (count := step_count(options.length, options.step)) != rows.shape[-2]:
+    if options.dt is not None and (count := step_count(span.length, options.step)) != rows.shape[-2]:
         steps = f"{count} steps of dt = {options.step:g} s"
         raise ValueError(f"tau has {rows.shape[-2]} rows, and there are {steps}: leave out dt")
 
@@ -346,5 +350,5 @@ def _by_displacements(system: System) -> Graph:
 
 
 @memo(OPTIONS_KEPT)
-def _options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
-    return RunOptions(t_end, method, t0=t0, **known_options(dict(options), NOT_TAKEN))
+def _options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> tuple[Steps, Span]:
+    return Steps(method, **known_options(dict(options), NOT_TAKEN)), Span(t_end, t0=t0)

@@ -14,7 +14,7 @@ import dynamics as dyn
 from dynamics import METHODS
 from dynamics.integrators import derive
 from dynamics.integrators.tableau import DOP853, DOPRI5, EULER, real_stability
-from dynamics.simulation.run_options import RunOptions
+from dynamics.simulation.run_options import Span, Steps
 from dynamics.simulation.stepper import stepper
 from dynamics.simulation.steps.step_program import compile_steps, step_program
 from tests.dynamics.linkages import windows
@@ -62,8 +62,7 @@ def test_no_run_passes_a_singularity_and_every_row_is_a_state_at_a_time_of_its_o
 def test_the_clock_makes_the_steps_of_the_state(method: str, t_end: float) -> None:
     problem = derive(first_order(lambda x, t: cg.cos(t) * x[0]), {})
     compiled = compile_steps(step_program(problem, METHODS[method], dense=True), "auto", True)
-    options = RunOptions(t_end, method, t0=0.3)
-    blocks = list(stepper(compiled, options).blocks(np.array([1.0]), options))
+    blocks = list(stepper(compiled, Steps(method)).blocks(np.array([1.0]), Span(t_end, t0=0.3)))
     t, h, t_old = (np.concatenate([getattr(block, name) for block in blocks]) for name in ("t", "h", "t_old"))
     assert np.array_equal(t - t_old, h)
     assert np.array_equal(t_old[1:], t[:-1])

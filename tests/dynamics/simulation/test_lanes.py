@@ -203,7 +203,7 @@ def test_as_many_steps_as_alone() -> None:
 def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
     from dynamics import METHODS
     from dynamics.integrators import derive
-    from dynamics.simulation.run_options import RunOptions
+    from dynamics.simulation.run_options import Steps
     from dynamics.simulation.steps.step_program import step_program
 
     problem = derive(spring(), {"k": 5.0, "tau0": 0.0, "tau1": 0.0})
@@ -211,15 +211,15 @@ def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
     def program(method: str) -> StepProgram:
         return step_program(problem, METHODS[method], dense=False)
 
-    fine = RunOptions(1.0)
+    fine = Steps()
     steps = 1000
     assert fits_lanes(program("dop853"), fine, 0, FEW_TRAJECTORIES)
     assert not fits_lanes(program("dop853"), fine, 0, FEW_TRAJECTORIES - 1)
-    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), 0, FEW_TRAJECTORIES)
-    assert fits_lanes(program("rk4"), RunOptions(1.0, "rk4"), steps, 1)
-    assert not fits_lanes(program("rk4"), RunOptions(1.0, "rk4", max_steps=999), steps, FEW_TRAJECTORIES)
-    assert not fits_lanes(program("gauss4"), RunOptions(1.0, "gauss4"), steps, VECTOR - 1)
-    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), 0, FEW_TRAJECTORIES)
+    assert not fits_lanes(program("radau"), Steps("radau"), 0, FEW_TRAJECTORIES)
+    assert fits_lanes(program("rk4"), Steps("rk4"), steps, 1)
+    assert not fits_lanes(program("rk4"), Steps("rk4", max_steps=999), steps, FEW_TRAJECTORIES)
+    assert not fits_lanes(program("gauss4"), Steps("gauss4"), steps, VECTOR - 1)
+    assert not fits_lanes(program("dop853"), Steps(rtol=1e-16), 0, FEW_TRAJECTORIES)
     q, qd = starts(spring(), 7)
     one_by_one = simulate_many(spring(), q, qd, 0.3, "radau", t_eval=[0.3])
     each_is_alone(spring(), one_by_one, q, qd, 0.3, "radau", t_eval=[0.3])

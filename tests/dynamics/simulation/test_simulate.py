@@ -13,7 +13,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS, System
 from dynamics.integrators import derive
-from dynamics.simulation.run_options import RunOptions
+from dynamics.simulation.run_options import Steps
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import step
 from tests.each_row import each_row
@@ -270,11 +270,11 @@ def test_an_option_is_taken_or_refused_by_name(method: str) -> None:
     equal = not METHODS[method].adaptive
     for name, value in {"dt": 0.1, "max_step": 0.1, "first_step": 0.1, "estimate_error": True}.items():
         if equal == (name in ("dt", "estimate_error")):
-            RunOptions(1.0, method, **{name: value})
+            Steps(method, **{name: value})
         else:
             with raises(ValueError, match=f"'{method}' .*{name}"):
-                RunOptions(1.0, method, **{name: value})
+                Steps(method, **{name: value})
     for name in ("rtol", "atol"):
-        RunOptions(1.0, method, **{name: 1e-3})
+        Steps(method, **{name: 1e-3})
         with raises(ValueError, match="rtol and atol must be finite"):
-            RunOptions(1.0, method, **{name: -1e-3})
+            Steps(method, **{name: -1e-3})
