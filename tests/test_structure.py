@@ -49,8 +49,8 @@ LAZY = {
 }
 MOST_LAZY = 10
 LINES = {  # at most; whoever makes room writes the lower number, and nobody a higher one
-    "packages": 65_885,
-    "tests": 43_072,
+    "packages": 62_223,
+    "tests": 41_499,
     "bench": 4_489,
     "pages": 5_297,
 }
@@ -58,11 +58,11 @@ MOST_FILES = 16  # in a folder, those of its sub-folders counted
 FILES = {  # of folders that have more: these numbers may only fall
     "cgraph/autodiff": 17,
     "cgraph/codegen": 24,
-    "cgraph/program": 31,
+    "cgraph/program": 24,
     "dynamics/equations": 47,
     "dynamics/experiments": 22,
     "dynamics/multibody": 60,
-    "dynamics/simulation": 41,
+    "dynamics/simulation": 34,
     "viz/commands": 22,
 }
 FACES = ("cgraph.extend", "cgraph._shared")  # of cgraph, besides itself
