@@ -158,6 +158,6 @@ def _run(model: Model, method: str, tau: Tau, events: Any, options: Mapping[str,
         raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
     if steps.estimate_error and sampled:
         raise ValueError("estimate_error cannot be with a SampledController: run again with half of dt and compare")
-    if not (callable(tau) or sampled):
+    if not (sampled or callable(tau) or isinstance(tau, float)):  # a number is checked with the start
         other_inputs(equations, tau)
     return Run(model, steps, tau, as_events(events), form, dense, names)
