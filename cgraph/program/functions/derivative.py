@@ -256,11 +256,15 @@ class ColoredMatrix:
             values[...] = 0.0
             return
         width, columns = self._runner(values.ndim == 3 and not self._full, 1).columns("x", self._seeds)
-        width //= 1 + sum([part.directions(1) for part in self._parts])
+        width //= 1 + self._directions
         rows = values.reshape(len(points), -1)
         write_batch(max(width // LEAST_BLOCK, 1) * LEAST_BLOCK, columns, points.T, rows.T, threads)
         if self._checks:
             _mend(values, lambda at, found: self._careful.write(points[at], found, threads))
+
+    @cached_property
+    def _directions(self) -> int:
+        return sum([part.directions(1) for part in self._parts])
 
     @cached_property
     def _careful(self) -> ColoredMatrix:
