@@ -247,7 +247,7 @@ def measured(error: str, m: int) -> list[Statement]:
     return [total(square, *SCALE, error), call(lambda sum_: {"error": cg.sqrt(sum_ / m)})]
 
 
-def moved(m: int) -> list[Statement]:
+def projected(m: int) -> list[Statement]:
     """x = register `onto`; `farthest`, the largest of such moves so far, a root mean square of move over tolerance."""
 
     def square(x: Node, rtol: Node, atol: Node, onto: Node) -> Values:

@@ -244,8 +244,8 @@ def outcome(
     run: Stepper, x: Array, span: Span, steps: list[StepBlock] | None = None, report: Progress | None = None
 ) -> tuple[Stats, Recorder]:
     """How a run from x (m,) goes, and its rows; steps: receives all; report: is told how far it is [s]."""
-    recorder, estimate = Recorder(x, span), RunEstimate(run, x, span)
     begin, kept, most = time.perf_counter(), 0, SMALL_MEMORY
+    recorder, estimate = Recorder(x, span), RunEstimate(run, x, span)
     found: tuple[float | None, float | None, tuple[str, ...]] = None, None, ()
     try:
         with np.errstate(all="ignore"):

@@ -230,7 +230,7 @@ class Run(HoldsNodes):
         if applied.controller is not None:
             one = "a SampledController may remember what it has seen, and so controls one motion"
             raise TypeError(f"{one}: ends of many are without")
-        run._require_given(parameters)
+        run._require_controller_values(parameters)
         span = Span(t_end, t0=t0, t_eval=[t_end])
         start = initial_values(applied.model, q, qd, applied.constant, parameters, span.t0)
         p = np.empty((len(start.x), len(problem.parameters)))
@@ -294,13 +294,13 @@ class Run(HoldsNodes):
         if not self._varied:
             return []
         given = parameters or {}
-        self._require_given(given)
+        self._require_controller_values(given)
         values = dict(self._equations.numbers) | {name: parameter_value(name, each) for name, each in given.items()}
         if given and (system := self._equations.applied.model.system) is not None:
             system.require_values(values)
         return [values[name] for name in self._equations.problem.parameters]
 
-    def _require_given(self, parameters: Mapping[str, Any] | None) -> None:
+    def _require_controller_values(self, parameters: Mapping[str, Any] | None) -> None:
         """Raises ValueError where a parameter of the controller has no value."""
         own = as_equations(self._model).parameters
         if missing := [name for name in self._varied if name not in own and name not in (parameters or {})]:
@@ -382,7 +382,7 @@ class Run(HoldsNodes):
                 raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
             observed = None if stepped.velocities is None else _compiled(stepped.velocities, self._options.backend)
             hold = Hold(applied.controller, applied.model.velocities, stepped.nq, span.t0, observed)
-        run = self._stepper(p, hold, rows=span.between)
+        run = self._stepper(p, hold, rows=span.has_inner_times)
         x = converted(stepped.momentum, span.t0, start, values)
 
         # Integrate, noting rows and events

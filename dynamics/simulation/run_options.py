@@ -200,7 +200,7 @@ class Span:
     t0: float = 0.0
     t_eval: ArrayLike | None = None
     times: Array | None = field(init=False)  # t_eval, (T,); None for every step
-    between: bool = field(init=False)  # whether times lie between the ends
+    has_inner_times: bool = field(init=False)  # whether times lie between the ends
     direction: float = field(init=False)  # 1.0, or -1.0 for a run back in time
     length: float = field(init=False)  # [s]
 
@@ -213,7 +213,7 @@ class Span:
             raise ValueError(f"t_end must be another time than t0, got {t_end!r} s for both")
         times = None if self.t_eval is None else times_to_record(self.t_eval, t_end, t0)
         inside = times is not None and not {*times.tolist()} <= {t0, t_end}
-        vars(self).update(t0=t0, t_end=t_end, t_eval=times, times=times, between=inside)
+        vars(self).update(t0=t0, t_end=t_end, t_eval=times, times=times, has_inner_times=inside)
         vars(self).update(direction=math.copysign(1.0, t_end - t0), length=abs(t_end - t0))
 
     @property

@@ -23,7 +23,7 @@ from .events.event_log import EventLog
 from .run_options import Span, Steps
 from .steps.dense_output import StepBlock, inside_nodes, with_hermite
 from .steps.equal_steps import EqualSteps, equal_steps
-from .steps.first_step import TOLERANCE, given, instant
+from .steps.first_step import START, TOLERANCE, instant, start_registers
 from .steps.flat_position import CREEP, FlatPosition
 from .steps.row_values import values_of
 from .steps.step_program import CompiledSteps, StepProgram, compile_steps, step_program
@@ -33,9 +33,7 @@ TINY = np.finfo(float).tiny
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 COUNTED = "steps", "rejected", "evaluations", "jacobians", "factorizations"
-END, GOAL, INSTANT, FIRST = [*given(dict.fromkeys(("t_end", "goal", "instant", "first"), 0.0))][
-    :4
-]  # names of registers
+END, GOAL, INSTANT, FIRST = [f"{START}{name}" for name in ("t_end", "goal", "instant", "first")]  # registers
 
 
 class StoppedError(Exception):
@@ -172,7 +170,11 @@ class Stepper(ABC):
     def _is_looked_at(self, span: Span) -> bool:
         """Whether a run over this span has to have every step in a block."""
         estimated, held = self.options.estimated, self.program.rows is not None
-        own = span.between or held or self.options.relative < self._relative if self.program.adaptive else estimated
+        own = (
+            span.has_inner_times or held or self.options.relative < self._relative
+            if self.program.adaptive
+            else estimated
+        )
         return own or self.every_step or span.times is None or self.events is not None
 
     @abstractmethod
@@ -456,14 +458,14 @@ def first_registers(program: StepProgram, options: Steps) -> dict[str, ArrayLike
     if not program.adaptive:
         return {"fresh": 1.0} if "fresh" in program.steps.registers else {}
     limits = {"longest_step": options.longest_step, "first": options.first_step or 0.0}
-    own = given({"relative": max(options.relative, program.finest), **limits})
+    own = start_registers({"relative": max(options.relative, program.finest), **limits})
     return {**own, "sized": float(options.atol is None), TOLERANCE: np.maximum(options.absolute, SMALLEST_ATOL)}
 
 
 def span_registers(span: Span) -> dict[str, float]:
     """Registers of a span of chosen steps."""
     ends = {"t_end": span.t_end, "goal": span.t_end, "instant": instant(span.t0, span.t_end)}
-    return {"t": span.t0, **given(ends)}
+    return {"t": span.t0, **start_registers(ends)}
 
 
 def nonfinite(components: Sequence[str], state: Array) -> str:

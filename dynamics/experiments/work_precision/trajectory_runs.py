@@ -150,4 +150,4 @@ class Ours(Solver):
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
         steps, span = self._options(knob, self.task.times)
-        return recorded(stepper(self._dense if span.between else self._plain, steps), self.start, span)
+        return recorded(stepper(self._dense if span.has_inner_times else self._plain, steps), self.start, span)

@@ -30,7 +30,7 @@ from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
 from .ensemble import Ensemble, Part, doubts
 from .store import Store, sweep_of
-from .task import Chunk, Task, Team, Workers, checked, finished
+from .task import Chunk, Task, Team, Workers, parts_of, team_of
 
 
 class ManyOptions(Options, total=False):
@@ -129,7 +129,7 @@ def simulate_many(
     t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
     steps = Steps(method, **known_options(options, ["dense_output"]))
     span = Span(t_end, t0=t0, t_eval=t_eval)
-    watched, team = as_events(events), checked(workers)
+    watched, team = as_events(events), team_of(workers)
     applied = with_applied(model, tau, parameters)
     start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
     steps.check(span, start.states)
@@ -143,7 +143,7 @@ def simulate_many(
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
-    program = step_program(problem, steps.integrator, dense=bool(watched) or span.between)
+    program = step_program(problem, steps.integrator, dense=bool(watched) or span.has_inner_times)
     watch, nq = event_program(problem, watched), problem.nq
 
     # Integrate, by whoever takes the chunks and compiles the steps
@@ -184,7 +184,7 @@ def simulate_many(
 
 def ends_of(task: Task, x: Array, p: Array, workers: Workers) -> Array:
     """The last rows (N, m) of motions from states x (N, m) with parameters p (N, ..); NaN, with a warning, of some."""
-    team, rows = checked(workers), np.empty((len(x), 1, x.shape[1]))
+    team, rows = team_of(workers), np.empty((len(x), 1, x.shape[1]))
     with np.errstate(all="ignore"):
         found = task.run_lanes(x, p, rows, lambda: False) if team == 1 and len(x) <= task.largest else None
     if found is not None and found[0].all() and not any(found[1].get("warnings", ())):
@@ -213,7 +213,7 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
 
     with (
         Progress("simulate", len(x), task.options.progress) as report,
-        closing(finished(task, [*left.values()], workers, whole.rows)) as parts,
+        closing(parts_of(task, [*left.values()], workers, whole.rows)) as parts,
     ):
         for part in parts:
             whole.place(part)

@@ -302,7 +302,7 @@ Team = int | Executor | Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Ite
 Workers = Team | None
 
 
-def checked(workers: Workers) -> Team:
+def team_of(workers: Workers) -> Team:
     """The number of threads, the executor or the map. Raises ValueError for what is none of these."""
     known: Any = workers
     is_class = isinstance(known, type) and issubclass(known, Executor)
@@ -315,7 +315,7 @@ def checked(workers: Workers) -> Team:
         raise ValueError(f"workers must be {kinds}, got {workers!r:.60}") from None
 
 
-def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -> Generator[Part, None, None]:
+def parts_of(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -> Generator[Part, None, None]:
     """The parts as they come, in any order; closing it, or an exception, ends the threads, which fill the table."""
     stop = threading.Event()
 

@@ -42,7 +42,7 @@ STILL = 2.0**-54  # of a coordinate, a quarter of its last digit: a step that mo
 WHOLE, FIRST_HALF, SECOND_HALF = 3.0, 2.0, 1.0  # register `search`
 
 
-def given(values: Mapping[str, Any]) -> dict[str, Any]:
+def start_registers(values: Mapping[str, Any]) -> dict[str, Any]:
     """Registers with which a run begins, besides x, t, p and sized: `GIVEN` and tolerance, its atol."""
     return {f"{START}{name}": value for name, value in {**values, "begins": 1.0}.items()} | {"anew": 1.0}
 

@@ -15,7 +15,7 @@ from cgraph.extend import Call, Factor, If, Program, Runner, Statement, runner
 
 from ...integrators import Method, Problem
 from ...integrators.problem import constraint_rates
-from ...integrators.step_control import moved
+from ...integrators.step_control import projected
 from .first_step import with_first_step
 from .state_sizes import StateKinds, state_kinds
 
@@ -97,7 +97,7 @@ def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
     if problem.projection is not None and method.adaptive:
         lengths = {**steps.registers, "onto": problem.size, "way": 1, "farthest": 1}
         onto = Call(problem.projection, ("x", "t", "p"), ("onto",))
-        return replace(steps, registers=lengths, body=[*steps.body, If("accepted", (onto, *moved(problem.size)))])
+        return replace(steps, registers=lengths, body=[*steps.body, If("accepted", (onto, *projected(problem.size)))])
     arrived = normalizing(problem, "t")
     body: list[Statement] = [If("accepted", tuple(arrived))] if arrived and method.adaptive else arrived
     return replace(steps, body=[*steps.body, *body])
