@@ -52,12 +52,12 @@ def _with_sign(value: float, positive: bool) -> Interval:
 
 def _product(a: float, b: float) -> Interval:
     """a * b, rounded down and up; zero times anything is zero."""
-    return (0.0, 0.0) if a == 0.0 or b == 0.0 else _with_sign(a * b, (a > 0.0) is (b > 0.0))
+    return (0.0, 0.0) if a == 0.0 or b == 0.0 else _with_sign(a * b, (a > 0.0) == (b > 0.0))
 
 
 def _quotient(a: float, b: float) -> Interval:
     """a / b for b other than zero, rounded down and up."""
-    return (0.0, 0.0) if a == 0.0 or math.isinf(b) else _with_sign(a / b, (a > 0.0) is (b > 0.0))
+    return (0.0, 0.0) if a == 0.0 or math.isinf(b) else _with_sign(a / b, (a > 0.0) == (b > 0.0))
 
 
 # Operations.

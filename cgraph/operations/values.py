@@ -64,7 +64,7 @@ def hypot(a: float, b: float) -> float:
 
 def sign(a: float) -> float:
     """-1.0, 0.0 or 1.0; NaN of NaN."""
-    return a if a != a else float((a > 0) - (a < 0))
+    return a if a != a else float(a > 0) - float(a < 0)
 
 
 def by_element(function: Callable[..., float]) -> Callable[..., Value]:

@@ -297,7 +297,9 @@ def test_gradients_where_a_rate_or_its_slopes_do_not_depend_on_the_state(method:
     for system, end in ((drift, 2.0), (clock, 1.75)):
         assert dyn.gradient(system, lambda x, t: x[0] ** 2, [1.0], None, **given)["q"] == approx([2.0 * end], rel=1e-12)
         assert dyn.sensitivities(system, [1.0], None, wrt="q", **given)["q"][-1, 0] == approx([1.0], rel=1e-12)
-    assert dyn.sensitivities(drift, [1.0], None, wrt="v", **given)["v"][-1] == approx([0.5], rel=1e-12)
+    late = dyn.OdeSystem(lambda x, t, p: [p["v"] * t], ["x"], {"v": 2.0})  # from 0, where it has no size yet
+    for system, slope in ((drift, 0.5), (late, 0.125)):
+        assert dyn.sensitivities(system, [0.0], None, wrt="v", **given)["v"][-1] == approx([slope], rel=1e-12)
     thrown = System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1], ["x", "y"])
     result = dyn.gradient(thrown, lambda q, qd, t: q[0] * q[1], [1.0, 2.0], [3.0, 0.0], **given)
     assert result["qd"] == approx(0.5 * result.q[::-1], rel=1e-12)

@@ -5,6 +5,7 @@ import math
 from itertools import combinations
 
 import mpmath
+import numpy as np
 import pytest
 from hypothesis import assume, given, settings, strategies as st
 
@@ -203,7 +204,7 @@ def boxes(draw: st.DrawFn, domains: tuple[tuple[float, float], ...]) -> list[tup
     for low, high in domains:
         width = (high - low) * draw(st.sampled_from((0.0, 1e-9, 0.1, 1.0)))
         start = draw(st.floats(low - 1.0, high) | st.sampled_from((0.0, -0.0, low, 1.0)))
-        result.append((start, start + width))
+        result.append((start, start + width) if result else (np.float64(start), np.float64(start + width)))
     return result
 
 
