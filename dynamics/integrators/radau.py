@@ -215,7 +215,7 @@ def _rights(problem: Problem) -> list[Statement]:
 
 
 def _change(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node, least: Node, *changes: Node) -> Values:
-    """The changes of a turn beside the tolerance of the step, or rounding, of what starts at 0 that of where it goes."""
+    """The changes of a turn beside the tolerance of the step, or rounding; what starts at 0 is as large as its end."""
     size = cg.where(rtol, scale(x, x_new, rtol, atol, leap), cg.where(least, least, EPSILON * abs(x_new)))
     squares = [cg.where(change, (change / size) * (change / size), 0.0) for change in changes]
     return {"change": squares[0] + squares[1] + squares[2]}
