@@ -53,7 +53,7 @@ def sub(a: Node, b: Node) -> Node | None:
 
 
 def mul(a: Node, b: Node) -> Node | None:
-    """a * b: 0 and 1 go, constants are joined, signs come out, and what a quotient takes on either side."""
+    """a * b: 0 and 1 go, constants are joined, signs come out, as do factors of quotients; squares of sizes."""
     if b.value is not None:
         a, b = b, a
     c = a.value
@@ -72,6 +72,9 @@ def mul(a: Node, b: Node) -> Node | None:
             return _cancelled(c, b)
         return _times_quotient(a, b)
     left, right = a.op.name, b.op.name
+    if a is b and left in ("abs", "hypot"):  # whose squares are smooth
+        squares = [x * x for x in a.args]
+        return squares[0] + squares[1] if left == "hypot" else squares[0]
     if left == "neg":
         return a.args[0] * b.args[0] if right == "neg" else -(a.args[0] * b)
     if right == "neg":

@@ -109,6 +109,7 @@ FOLDS = (
     (cg.sin(-x) * cg.sin(-y), "%1 = sin x; %2 = sin y; %3 = mul %1 %2; f = %3"),
     (cg.cos(-x), "%1 = cos x; f = %1"),
     (abs(-x), "%1 = abs x; f = %1"),
+    (abs(x) ** 2, "%1 = mul x x; f = %1"),
     (x + -y, "%1 = sub x y; f = %1"),
     (x - -y, "%1 = add x y; f = %1"),
     (-x * -y, "%1 = mul x y; f = %1"),

@@ -258,6 +258,11 @@ def test_slides_in_more_directions_than_there_are_have_no_inertia(seed: int) -> 
             forward_dynamics(dyn.Mechanism(bodies))
 
 
+def test_a_speed_has_a_square_at_rest() -> None:
+    fall = dyn.System(lambda q, qd, t: 0.5 * cg.hypot(qd[0], qd[1]) ** 2 - 9.81 * q[1], "x y")
+    assert dyn.simulate(fall, [0.0, 0.0], [0.0, 0.0], 1.0).q[-1] == pytest.approx([0.0, -4.905])
+
+
 @pytest.mark.parametrize("held", [False, True])
 def test_a_force_that_overflows_is_no_singular_mass_matrix(held: bool) -> None:
     """At all states that are tried; the one of interest is another."""
