@@ -49,7 +49,7 @@ LAZY = {
 }
 MOST_LAZY = 10
 LINES = {  # at most; whoever makes room writes the lower number, and nobody a higher one
-    "packages": 62_232,
+    "packages": 62_226,
     "tests": 41_500,
     "bench": 4_489,
     "pages": 5_297,

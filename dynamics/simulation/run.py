@@ -166,7 +166,7 @@ class Run(HoldsNodes):
         q, qd = floats(q), floats(qd)
         plain = type(q) is np.ndarray and (qd is None or type(qd) is np.ndarray) and alone.program.normalization is None
         plain = plain and type(t0) is type(t_end) is float and self._options.may_go(t0, t_end)
-        if not (plain and alone.has_begun(q, qd, t0, t_end)):  # see what is wrong
+        if not (plain and alone.try_begin(q, qd, t0, t_end)):  # see what is wrong
             span = Span(t_end, t0=t0)
             alone.begin(run._start(q, qd, span, alone.parameters), span.t0, span.t_end)
             t_end = span.t_end

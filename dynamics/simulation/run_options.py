@@ -53,7 +53,8 @@ class Options(TypedDict, total=False):
         Trials of steps, rejected ones too, after which the run stops.
     estimate_error : bool
         Of equal steps, whether runs of steps two and four times as long estimate their error (`Stats.error`), which
-        takes three quarters as long again; by default they do, but never with a `SampledController`.
+        takes three quarters as long again; by default they do, but never with a `SampledController`
+        or events that reset the state; the run says "error not estimated" then.
     dense_output : bool
         Whether to keep what lies between the rows, for `Trajectory.solution(t)`.
     form : {"velocity", "momentum"}

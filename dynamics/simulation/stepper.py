@@ -96,7 +96,7 @@ class Stepper(ABC):
         self.x[:] = x
         self._begin(t0, t_end)
 
-    def has_begun(self, q: object, qd: object, t0: float, t_end: float) -> bool:
+    def try_begin(self, q: object, qd: object, t0: float, t_end: float) -> bool:
         """Start anew from q and qd; whether they are arrays of float64 that fit and finite. qd: None where q is all."""
         self._numbers[:], self.status = self._zero, ""
         try:  # which compares shapes and types, quicker than to look at them first

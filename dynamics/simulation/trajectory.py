@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from cgraph import Graph, _shared
 from cgraph._shared import Array, counted, or_nearest
 
+from ..integrators import METHODS
 from .applied_force import HeldForces
 from .steps.dense_output import Solution
 from .steps.row_values import origin, row_values
@@ -357,5 +358,6 @@ class Trajectory:
         what = f"{n} coordinate(s)" if self.qd.shape[1] else f"{n} state(s)"
         rows = f"{counted(len(self.t), 'row')}, t = {self.t[0]:g} .. {self.t[-1]:g} s" if len(self.t) else "no rows"
         happened = "".join([f", {len(crossings.t)} of event {name}" for name, crossings in self.events.items()])
-        said = "; ".join([stats.message, *[f"warning: {text}" for text in stats.warnings]])
+        unknown = ["error not estimated"] if stats.error is None and not METHODS[stats.method].adaptive else []
+        said = "; ".join([stats.message, *unknown, *[f"warning: {text}" for text in stats.warnings]])
         return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {counted(stats.steps, 'step')}, {said}>"

@@ -166,15 +166,6 @@ class Solution:
         states = converted(self.velocities, wanted, self._states(wanted)).reshape(*times.shape, len(self.x))
         return states[..., : self.nq], states[..., self.nq :]
 
-    def along(self, block: StepBlock, shares: Array) -> Array:
-        """q and qd beside each other, (T, k, nq + n), at shares (k,) of the way from a step's begin to its end."""
-        rows, parts = np.repeat(np.arange(len(block.t)), len(shares)), np.tile(shares, len(block.t))
-        way = np.ones_like(block.h)  # of a step, shorter where an event has cut it
-        np.divide(block.t - block.t_old, block.h, out=way, where=block.h != 0.0)
-        s = way[rows] * parts
-        states = np.where((parts == 1.0)[:, None], block.x[rows], block.states_at(rows, s))
-        return converted(self.velocities, block.times_at(rows, s), states).reshape(len(block.t), len(shares), -1)
-
     def _states(self, times: Array) -> Array:
         states = np.tile(self.x, (len(times), 1))
         direction = 1.0 if self.steps and self.steps[-1].t[-1] > self.t0 else -1.0
