@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -21,6 +21,9 @@ from ..equations.substitute import substitute
 from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Equations, Model, as_equations
 from ..systems.system import System
+
+if TYPE_CHECKING:
+    from .switches import Switches
 
 KEPT_PROBLEMS = 16  # problems that stay for another run, with what was derived from them
 
@@ -42,6 +45,7 @@ class Problem:
     velocities: Graph | None = None  # qd, of states q and p = dL/dqd; None of states q and qd
     momentum: Graph | None = None  # p of q and qd, inputs in place of the states; None of states q and qd
     missing: Graph | None = None  # what the velocities leave of the momenta; None where they are not iterated
+    switches: Switches | None = None  # of a problem in modes, see `switched`
 
     @property
     def size(self) -> int:
@@ -137,7 +141,7 @@ def total_energy(problem: Problem) -> Graph | None:
 def constraint_rates(problem: Problem) -> Graph | None:
     """The rates of the constraints that are kept, by their names; None without constraints."""
     system = problem.system
-    if system is None or problem.projection is None:
+    if system is None or not len(system.constraints):
         return None
     constraints = system.constraints
     rates = {constraints.names[k]: constraints.rates[k] for k in independent_rows(constraints)}

@@ -20,9 +20,10 @@ from cgraph._shared import memo
 from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
 
 from .problem import Problem
+from .switches import Switches
 from .step import Step, Values, call, count, each, numbered, rate_calls, total, with_registers
 
-RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
+RUNNING, DONE, TOO_SMALL, CROSSED = 0.0, 1.0, 2.0, 3.0  # register `status`
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 5.0  # factors from one step to the next
 MEMORY = 0.04  # weight of the estimate before in the choice of the next step (Gustafsson's PI control)
 RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
@@ -202,8 +203,18 @@ def chosen(step: Step, problem: Problem, *, dense: bool, starts: bool) -> Progra
     body += [trial, *step.body, *step.error, control(rate_calls(problem, step.body, step.error))]
     after = [If("row", (*polynomial, *_counted(problem, polynomial)))] if dense else []
     body.append(accept_step(step.estimate, *after, *step.kept, *(step.handed or ()), starts=starts))
+    if problem.switches is not None:
+        body.append(_crossed(problem.switches))
+        lengths |= {"margins": len(problem.switches.turns), "beyond": 1}
     record = ["t", "h", "x", *(["t_old", "x_old", *coefficients] if dense else [])]
     return Program(lengths, body, record, record_if="row", stop="status")
+
+
+def _crossed(switches: Switches) -> If:
+    """After an accepted step, whether it has ended beyond a surface, where the run stops."""
+    beyond = total(lambda margins: {"beyond": margins < 0.0})
+    stops = call(lambda beyond, status: {"status": cg.where(beyond, CROSSED, status)})
+    return If("row", (Call(switches.margins, ("x", "t", "p"), ("margins",)), beyond, stops))
 
 
 def _forgotten(step: Step, problem: Problem) -> list[Statement]:

@@ -20,6 +20,7 @@ from cgraph._shared import Array, HoldsNodes, floats, kept_by_first
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import initial_values, other_inputs, start_state
 from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
+from ..integrators.switches import switched
 from ..systems.arguments import parameter_value
 from ..systems.model import Model, as_equations
 from .applied_force import Applied, Hold, Tau, with_applied
@@ -102,7 +103,7 @@ class Run(HoldsNodes):
         numbers = other_inputs(applied.model, applied.constant, self._values)
         stay = {*self._varied} if applied.controller is None else {*state_inputs(applied.model).applied}
         problem = derive(applied.model, {name: value for name, value in numbers.items() if name not in stay})
-        stepped = in_form(problem, self._form)
+        stepped = switched(in_form(problem, self._form))
         watched = event_program(stepped, self._events) if self._events else None
         return RunEquations(applied, numbers, problem, stepped, watched)
 
@@ -334,7 +335,8 @@ class Run(HoldsNodes):
     def _is_of_steps_alone(self) -> bool:
         """Whether nothing is done between the steps."""
         applied, _, _, stepped, watched = self._equations
-        return not (watched or applied.controller or stepped.momenta or self._options.max_steps < math.inf)
+        more = stepped.switches or self._options.max_steps < math.inf
+        return not (watched or applied.controller or stepped.momenta or more)
 
     @cached_property
     def _memories(self) -> threading.local:

@@ -16,13 +16,15 @@ from numpy.typing import ArrayLike
 from cgraph._shared import Array
 
 from ..integrators import Problem
-from ..integrators.step_control import DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
+from ..integrators.step_control import CROSSED, DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from .applied_force import Hold
+from .events.crossing_search import Crossing
 from .events.event import EventProgram
 from .events.event_log import EventLog
+from .events.modes import Modes
 from .run_options import Span, Steps
 from .steps.dense_output import StepBlock, inside_nodes, with_hermite
-from .steps.equal_steps import EqualSteps, equal_steps
+from .steps.equal_steps import EqualSteps, equal_steps, steps_after
 from .steps.first_step import START, TOLERANCE, instant, start_registers
 from .steps.flat_position import CREEP, FlatPosition
 from .steps.row_values import values_of
@@ -30,6 +32,7 @@ from .steps.step_program import CompiledSteps, StepProgram, compile_steps, step_
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 TINY = np.finfo(float).tiny
+CROSSED_BLOCK = 64  # equal steps between two looks for crossings, at most
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 COUNTED = "steps", "rejected", "evaluations", "jacobians", "factorizations"
@@ -53,29 +56,37 @@ class Stepper(ABC):
     _: KW_ONLY
     control: Hold | None = None
     events: EventProgram | None = None
+    modes: Modes | None = None
     stopped: Callable[[], bool] = lambda: False  # asked before every block
     every_step: bool = False  # whether all are in blocks, also where rows and checks need the last of a block alone
 
     def __post_init__(self) -> None:
-        self.program, self.runner = self.compiled.program, self.compiled.runner
-        self._at, self._stop = self.compiled.places, self.compiled.places[str(self.runner.program.stop)]
-        self._passes, self._relative = FIRST_PASSES, max(self.options.relative, self.program.finest)
+        self._passes, self._given, self._first = FIRST_PASSES, list(self.parameters), 0.0
+        self._load(self.compiled)
+        if self.control is None:
+            self.set_parameters(self._given)
+        self._clear()
+
+    def _load(self, compiled: CompiledSteps) -> None:
+        """Take these steps, in a memory of their own."""
+        self.compiled, self.program, self.runner = compiled, compiled.program, compiled.runner
+        self._at, self._stop = compiled.places, compiled.places[str(self.runner.program.stop)]
+        self._relative = max(self.options.relative, self.program.finest)
         self._start, self._memory = np.zeros(self.runner.size), np.zeros(self.runner.size)
         self._numbers: Any = self._memory.data  # whose items are read and written faster
         self._zero: Any = self._start.data
         for name, value in first_registers(self.program, self.options).items():
             self.runner.write(self._start, name, value)
-        if self.control is None:
-            self.set_parameters(self.parameters)
         self.x = self.runner.read(self._memory, "x")
         self.q, self.qd = self.x[: self.program.nq], self.x[self.program.nq :]
         self._halves: Any = (self.q.data, self.qd.data)
-        self._clear()
+        vars(self).pop("_unrecorded", None)
 
     def _clear(self) -> None:
         """Forget the run before."""
         self.steps = self.rejected = self.evaluations = self.jacobians = self.factorizations = self.resets = 0
         self._before = dict.fromkeys(COUNTED, 0)  # the last reset
+        self._first = 0.0
         self.largest, self.warnings, self._is_stiff, self._is_told = 0.0, list[str](), False, False
         self.status = self.event = ""
         self.log = None if self.events is None else EventLog(self.events)
@@ -87,14 +98,41 @@ class Stepper(ABC):
 
     def set_parameters(self, p: Sequence[float]) -> None:
         """Values of the parameters in the runs that begin from here on."""
-        self.parameters = list(p)
+        self._given = list(p)
+        self.parameters = self._given if self.modes is None else [*p, *self.modes.values.tolist()]
         self.runner.write(self._start, "p", self.parameters)
 
     def begin(self, x: Array, t0: float, t_end: float) -> None:
         """Start anew, from x (m,) at t0, on the way to t_end."""
-        self._numbers[:], self.status = self._zero, ""
+        if self.modes is not None:
+            self._given = self._given if self.control is None else self.control.at(t0, x)
+            self.modes.begin(t0, x, self._given)
+            self._enter_modes()
+        self._numbers[:], self.status = self._zero, "" if self.modes is None else self.modes.failed
         self.x[:] = x
         self._begin(t0, t_end)
+
+    def _enter_modes(self) -> None:
+        """Take the steps of the problem that the modes are of, and their values."""
+        assert self.modes is not None
+        program = step_program(self.modes.problem, self.options.integrator, dense=True)
+        if program is not self.program:
+            self._load(compile_steps(program, self.options.backend, self.options.fma))
+        self.set_parameters(self._given)
+
+    def _turn(self, crossing: Crossing, block: StepBlock, t_end: float) -> None:
+        """Go on where a surface is crossed, at the end of a block, with a step as long as the one that ends there."""
+        assert self.modes is not None
+        t, x, sizes = float(block.t[-1]), block.x[-1].copy(), self.modes.sizes
+        self._before = {name: getattr(self, name) for name in COUNTED}
+        self.modes.turn(t, x, self._given, crossing.number)
+        self._enter_modes()
+        self._numbers[:], self.status = self._zero, self.modes.failed
+        self.x[:] = x
+        self._first = float(abs(block.h[-1]))
+        self._begin(t, t_end)
+        if (name := f"{START}so_far") in self.runner.program.registers:
+            self.runner.write(self._memory, name, sizes)
 
     def try_begin(self, q: object, qd: object, t0: float, t_end: float) -> bool:
         """Start anew from q and qd; whether they are arrays of float64 that fit and finite. qd: None where q is all."""
@@ -113,21 +151,31 @@ class Stepper(ABC):
     def blocks(self, x: Array, span: Span) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time. A reset by an event is a step of no length."""
         self._clear()
-        t, looked, log = span.t0, self._is_looked_at(span), self.log
-        while True:
-            self.begin(x, t, span.t_end)
+        self.begin(x, span.t0, span.t_end)
+        yield from self._going(span)
+
+    def _going(self, span: Span) -> Iterator[StepBlock]:
+        """The steps of a run that has begun, or goes on."""
+        looked, log = self._is_looked_at(span), self.log
+        while not self.status:
+            crossing: Crossing | None = None
             for block in self._recorded(span, looked):
-                if log is None:
-                    yield block
-                    continue
-                log.parameters = self.parameters
-                cut = log(self.with_dense(block))
+                cut = block
+                if self.modes is not None:
+                    cut, crossing = self._crossed(self.with_dense(block))
+                if log is not None:
+                    log.parameters = self.parameters
+                    cut = log(self.with_dense(cut))
+                    crossing = None if log.ended or log.restart else crossing
                 self.steps -= len(block.t) - len(cut.t)
                 if len(cut.t):
                     yield cut
-                if log.ended or log.restart:
+                if crossing is not None or (log is not None and (log.ended or log.restart)):
                     self.status = ""  # of a step beyond
                     break
+            if crossing is not None and cut.t[-1] != span.t_end:
+                self._turn(crossing, cut, span.t_end)
+                continue
             if log is None:
                 return
             if not (self.status or log.ended or log.restart):
@@ -141,7 +189,23 @@ class Stepper(ABC):
             yield StepBlock(at, x[None], at, np.zeros(1), before[None], np.zeros((1, 1, len(x))))
             if self.event or t == span.t_end:
                 return
-            self._before = {name: getattr(self, name) for name in COUNTED}
+            self._before, self._first = {name: getattr(self, name) for name in COUNTED}, 0.0
+            self.begin(x, t, span.t_end)
+
+    def _crossed(self, block: StepBlock) -> tuple[StepBlock, Crossing | None]:
+        """The steps up to where the first surface is crossed, and this; or all."""
+        assert self.modes is not None
+        crossing, is_sure = self.modes.first_crossing(block, self._given)
+        if not is_sure:
+            text = f"surfaces may be crossed unseen, first after t = {block.t_old[0]:.6g} s: take a shorter max_step or dt"
+            self.warnings += [] if text in self.warnings else [text]
+        if crossing is not None:
+            t, x = (
+                of(np.array([crossing.row]), np.array([crossing.s]))[0] for of in (block.times_at, block.states_at)
+            )
+            block = block.part(slice(crossing.row + 1)).ending(float(t), x)
+        self.modes.see(block.x)
+        return block, crossing
 
     def with_dense(self, block: StepBlock) -> StepBlock:
         """The block that has come last, with dense output; that of equal steps is made by shorter steps."""
@@ -175,7 +239,7 @@ class Stepper(ABC):
             if self.program.adaptive
             else estimated
         )
-        return own or self.every_step or span.times is None or self.events is not None
+        return own or self.every_step or span.times is None or self.events is not None or self.modes is not None
 
     @abstractmethod
     def _recorded(self, span: Span, looked: bool) -> Iterator[StepBlock]:
@@ -235,7 +299,7 @@ class Stepper(ABC):
 
     def _hold(self, control: Hold, t_end: float) -> float:
         """Take the forces of the period of control that begins; when it ends, or the run."""
-        self.parameters = control.at(self.t, self.x)
+        self.set_parameters(control.at(self.t, self.x))
         self.runner.write(self._memory, "p", self.parameters)
         return next(control.ends(self.t, t_end))
 
@@ -258,16 +322,16 @@ class EqualStepper(Stepper):
 
     def beside(self, stretches: Sequence[EqualSteps]) -> EqualStepper:
         """The stepper of other stretches, without events."""
-        options = replace(self.options, max_steps=math.inf)
-        other = EqualStepper(self.compiled, options, self.parameters, stopped=self.stopped)
+        options, modes = replace(self.options, max_steps=math.inf), self.modes and Modes(self.modes.plain)
+        other = EqualStepper(self.compiled, options, self._given, stopped=self.stopped, modes=modes)
         other.stretches = stretches
         return other
 
     def _recorded(self, span: Span, looked: bool) -> Iterator[StepBlock]:
-        instants = [self.t, *[t for t in span.instants if span.direction * (t - self.t) > 0.0]]
-        instants = instants if self.control is None else self.control.instants(instants)
+        instants = span.instants if self.control is None else self.control.instants(span.instants)
         m, most, total = self.program.size, self.options.max_steps, 0
-        for stretch in self.stretches or equal_steps(instants, self.options.step):
+        longest = CROSSED_BLOCK if self.modes is not None else math.inf
+        for stretch in steps_after(self.stretches or equal_steps(instants, self.options.step), self.t):
             self._enter(stretch)
             if self.control is not None:
                 self._hold(self.control, stretch.end)
@@ -276,7 +340,7 @@ class EqualStepper(Stepper):
                     self.status = self._too_many()
                     return
                 before, t_old, x_old = self._memory.copy(), self.t, self.x.copy()
-                rows, done = self._rows(int(min(self._left, most - self.steps)), looked)
+                rows, done = self._rows(int(min(self._left, most - self.steps, longest)), looked)
                 if self._numbers[self._stop]:
                     done -= 1
                     rows = self._undo(before, done, looked)
@@ -336,8 +400,8 @@ class ChosenStepper(Stepper):
             self._flat = FlatPosition(self.program, t0, self.x, self.parameters)
 
     def _recorded(self, span: Span, looked: bool) -> Iterator[StepBlock]:
-        if self.resets:
-            self._set(**{FIRST: 0.0})
+        if self.resets or self._first:
+            self._set(**{FIRST: self._first})
         most = max(1.0, self.options.max_steps - self._before["steps"] - self._before["rejected"])
         while True:
             left = most - self._number("trials")
@@ -353,6 +417,8 @@ class ChosenStepper(Stepper):
             if len(rows):
                 self._look(rows, absolute)
                 yield self._block(rows)
+            if self._numbers[self._stop] == CROSSED:  # a surface that is touched
+                self._set(status=DONE if self.t == self._number("end") else RUNNING)
             self._judge(rows)
             if self.status or (self._numbers[self._stop] == DONE and not self._next_period(span)):
                 return
@@ -483,9 +549,10 @@ def unsolved(components: Sequence[str], before: Array, x: Array) -> str:
 
 def stepper_of(problem: Problem, options: Steps, parameters: Sequence[float], *, dense: bool, **named: Any) -> Stepper:
     """The stepper of a problem. dense: with all steps, and the dense output of chosen ones."""
-    program = step_program(problem, options.integrator, dense=dense)
+    modes = None if problem.switches is None else Modes(problem)
+    program = step_program(problem, options.integrator, dense=dense or modes is not None)
     compiled = compile_steps(program, options.backend, options.fma)
-    return stepper(compiled, options, parameters, every_step=dense, **named)
+    return stepper(compiled, options, parameters, every_step=dense, modes=modes, **named)
 
 
 def stepper(compiled: CompiledSteps, *arguments: Any, **named: Any) -> Stepper:

@@ -143,7 +143,7 @@ def event_program(problem: Problem, events: Sequence[Event]) -> EventProgram:
     for event in events:
         values = problem.observed({"g": quantity(problem, f"event {event.name!r}", event.value)})
         moving = values.inputs[: problem.size + 1]
-        slopes, errors = cg.simplify(cg.jvp(values, list(moving))), _errors(values, moving)
+        slopes, errors = cg.simplify(cg.jvp(values, list(moving))), rounding_errors(values, moving)
         reset = None if event.reset is None else _reset(problem, f"the reset of event {event.name!r}", event.reset)
         watched.append(WatchedEvent(event.name, event.direction, event.terminal, values, slopes, errors, reset))
     return EventProgram(tuple(watched), problem.components, problem.rate, problem.velocities)
@@ -171,7 +171,7 @@ def _reset(problem: Problem, what: str, function: Callable[..., Any]) -> Graph:
     return problem.observed({f"x{k}": node for k, node in enumerate(nodes)})
 
 
-def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
+def rounding_errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
     """The outputs' rounding, to first order, from errors of the inputs, node by node: |partials| times errors."""
     leaves, zero = new_variables("error", len(inputs), graph.input_names), cg.constant(0.0)
     errors: dict[Node, Node] = dict(zip(inputs, leaves, strict=True))

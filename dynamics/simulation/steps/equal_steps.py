@@ -38,6 +38,23 @@ def equal_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
     return [_divided(begin, end, step_count(end - begin, dt)) for begin, end in itertools.pairwise(instants)]
 
 
+def steps_after(stretches: Sequence[EqualSteps], t: float) -> list[EqualSteps]:
+    """What is left of steps after an instant, from which the first goes on to where the step around it ends."""
+    left, near = list[EqualSteps](), SAME_INSTANT * math.ulp(t)
+    for part in stretches:
+        forth = math.copysign(1.0, part.h)
+        done = math.floor((t - part.begin) / part.h + ALIKE) if forth * (t - part.begin) > 0.0 else 0
+        after = part.end if done + 1 >= part.steps else part.begin + (done + 1) * part.h
+        if forth * (part.end - t) <= near or t == part.begin or forth * (t - part.begin) < 0.0:
+            left += [part] if forth * (part.end - t) > near else []
+            continue
+        if forth * (after - t) > near:
+            left.append(EqualSteps(t, after - t, 1, after))
+        if done + 1 < part.steps:
+            left.append(EqualSteps(after, part.h, part.steps - done - 1, part.end))
+    return left
+
+
 def _divided(begin: float, end: float, count: int) -> EqualSteps:
     return EqualSteps(begin, (end - begin) / count, count, end)
 

@@ -58,7 +58,7 @@ def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: 
     if starts:  # the first trial is as long as the method wishes, by sizes of the start alone
         nothing = {"search": 0.0, "longest_next": 0.0}
         wish = call(lambda first, length: {"h_next": cg.where(first, first, length), **nothing})
-        sizes = If("sized", (each(lambda x_start: {"size": _size(x_start)}), *tolerance))
+        sizes = If("sized", (each(lambda x_start, so_far: {"size": cg.maximum(so_far, _size(x_start))}), *tolerance))
         found = [If("begins", (copied("x", "x_start"), begin, wish, sizes))]
     else:
         begins = If("begins", (copied("x", "x_start"), begin, _rate(problem, "x", "t", "rate_start")))
@@ -70,7 +70,7 @@ def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: 
     after += [If("row", (larger,)), If("due", raised, seldom=True)]
     before = [If("anew", (*found, *_set_out(problem, AT_ONCE if starts else FIRST_LOOK)), seldom=True)]
     first, last = (_of_start(part, {*registers(problem), "farthest"}) for part in (before, after))
-    known = {**steps.registers, **{f"{START}{name}": 1 for name in GIVEN}}
+    known = {**steps.registers, **{f"{START}{name}": 1 for name in GIVEN}, f"{START}so_far": problem.size}
     return replace(steps, registers=lengths_of([*first, *last], known), body=[*first, *steps.body, *last])
 
 
@@ -88,6 +88,11 @@ def _of_start(statements: Sequence[Statement], shared: Collection[str]) -> tuple
 
 def _size(x: Node) -> Node:
     return cg.where(abs(x) < math.inf, abs(x), 0.0)
+
+
+def _so_far(fine: Node, ahead: Node, x: Node, before: Node) -> Node:
+    """The largest of the size ahead, if that is to be trusted, or else of the state, and that of steps before."""
+    return cg.maximum(before, cg.where(fine, ahead, _size(x)))
 
 
 def _rate(problem: Problem, x: str, t: str, target: str) -> Call:
@@ -174,7 +179,7 @@ def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -
         Call(kinds.largest, ("x_start",), ("kind",)),
         call(lambda h_look: {"reach": h_look, "left": HALVINGS}),
         While("left", (*euler, call(shorter))),
-        each(lambda fine, size_ahead, x_start: {"size": cg.where(fine, size_ahead, _size(x_start))}),
+        each(lambda fine, size_ahead, x_start, so_far: {"size": _so_far(fine, size_ahead, x_start, so_far)}),
         *tolerance,
     )
 

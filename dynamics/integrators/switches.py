@@ -1,0 +1,307 @@
+"""Switches: a rate that jumps or kinks as a smooth one, whose sides of switching surfaces are inputs, its modes.
+
+Where g passes zero, sign(g), |g|, a < b, max(a, b) and their kin take another piece. A mode says which side of such a
+surface holds: -1 or 1, or n of a floor. In a slide, of a mode half way between two sides, the rate is mixed from
+those of both so that g stays zero (Filippov 1988): f = f_0 + sum_j w_j (f_j - f_0), with shares 0 <= w <= 1 of f_j,
+which differs from f_0 in the side of surface j.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph._shared import columns, kept_by_first
+from cgraph.extend import Builder, building, folded, tangents, topological
+
+from ..systems.arguments import new_variables
+from .problem import Problem
+
+COMPARED = {"less", "less_equal"}
+KINKS = {"abs", "minimum", "maximum"}
+STEPS = {"floor", "ceil", "round"}
+SWITCHED = {"sign", "fmod", *COMPARED, *KINKS, *STEPS}
+
+
+@dataclass(frozen=True, eq=False)
+class Switches:
+    """The surfaces of a problem in modes, which are its last parameters. Graphs are over states, t and parameters."""
+
+    modes: tuple[str, ...]
+    surfaces: tuple[Node, ...]  # g, over the inputs of the rate and earlier modes
+    spacing: tuple[float, ...]  # from one side to the next: 2, or 1 of a whole number
+    signs: tuple[bool, ...]  # whether the rate has the sign of g as such, as friction has
+    gaps: Graph  # g, less the n of a floor: zero at the lower end of a side, in a slide at the surface
+    margins: Graph  # positive where the modes hold
+    turns: tuple[tuple[int, int], ...]  # of each margin, the mode that turns where it is zero, and whether up or down
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The surfaces as formulas."""
+        return tuple([str(cg.Graph(topological_inputs(g), {"g": g})) for g in self.surfaces])
+
+
+def topological_inputs(node: Node) -> list[Node]:
+    """Variables that a node depends on."""
+    return [each for each in topological([node]) if each.op.name == "variable"]
+
+
+@kept_by_first
+def switched(problem: Problem) -> Problem:
+    """The problem in modes; the same object where the rate is smooth, or has solvers of its own."""
+    if problem.missing is not None or not any([node.op.name in SWITCHED for node in problem.rate.nodes]):
+        return problem
+    reader = _Reader(problem)
+    rates = reader.read(list(problem.rate.outputs.values()))
+    used = reader.used(rates)
+    if not used:
+        return problem
+    inputs = [*problem.rate.inputs, *[surface.mode for surface in used]]
+    over = [surface.gap for surface in used]
+    margins, turns = list[Node](), list[tuple[int, int]]()
+    with building(reader.build):
+        for k, surface in enumerate(used):
+            if surface.spacing == 1.0:
+                margins += [surface.gap, 1.0 - surface.gap]
+                turns += [(k, -1), (k, 1)]
+            else:
+                margins.append(surface.mode * surface.gap)
+                turns.append((k, 0))
+    names = tuple([str(surface.mode.name) for surface in used])
+    switches = Switches(
+        names,
+        tuple([surface.quantity for surface in used]),
+        tuple([surface.spacing for surface in used]),
+        tuple([surface.is_sign for surface in used]),
+        _numbered(inputs, over),
+        _numbered(inputs, margins),
+        tuple(turns),
+    )
+    outputs = dict(zip(problem.rate.outputs, rates, strict=True))
+    more = {name: _widened(getattr(problem, name), names) for name in ("projection", "multipliers", "velocities")}
+    more |= {name: _widened(getattr(problem, name), names) for name in ("momentum",)}
+    parameters = (*problem.parameters, *names)
+    return replace(problem, parameters=parameters, rate=Graph(inputs, outputs), switches=switches, **more)
+
+
+def _numbered(inputs: Sequence[Node], nodes: Sequence[Node]) -> Graph:
+    return Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})
+
+
+def _widened(graph: Graph | None, names: Sequence[str]) -> Graph | None:
+    """The graph with inputs besides that it does not use."""
+    return graph and Graph([*graph.inputs, *cg.variables(list(names))], graph.outputs)
+
+
+@dataclass
+class _Surface:
+    """A surface that was read: its mode, the quantity, and this less the n of a floor."""
+
+    mode: Node
+    quantity: Node
+    gap: Node
+    spacing: float
+    is_sign: bool = False
+
+
+class _Reader:
+    """Reads nodes into modes."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.build, self._taken = Builder(), [*problem.rate.input_names]
+        self._surfaces: dict[tuple[Node, float], _Surface] = {}
+        self._smooth = frozenset[Node]()
+
+    def read(self, nodes: Sequence[Node]) -> list[Node]:
+        """Copies of nodes with modes in place of what switches."""
+        new: dict[Node, Node] = {}
+        with building(self.build) as labelled:
+            for node in topological(nodes):
+                if not node.args:
+                    new[node] = node
+                    continue
+                labelled(node.label)
+                args = [new[arg] for arg in node.args]
+                made = self._piece(node.op.name, args) if node.op.name in SWITCHED else None
+                new[node] = self.build(node.op, tuple(args), node.label, node.name) if made is None else made
+        return [new[node] for node in nodes]
+
+    def used(self, rates: Sequence[Node]) -> list[_Surface]:
+        """Surfaces that rates depend on, or others of these, in the order in which they were read."""
+        reached, waiting = set[Node](), list(rates)
+        by_mode = {surface.mode: surface for surface in self._surfaces.values()}
+        while waiting:
+            for node in topological([waiting.pop()]):
+                if node in by_mode and node not in reached:
+                    reached.add(node)
+                    waiting.append(by_mode[node].gap)
+        return [surface for mode, surface in by_mode.items() if mode in reached]
+
+    def _piece(self, name: str, args: list[Node]) -> Node | None:
+        """The piece of an operation that modes choose; None where it never switches."""
+        if all([arg.value is not None for arg in args]):
+            return None
+        a, b = args[0], args[-1]
+        if name in STEPS:
+            sign, offset = {"floor": (1.0, 0.0), "ceil": (-1.0, 0.0), "round": (1.0, 0.5)}[name]
+            return sign * self._mode(sign * a + offset, 1.0)[0]
+        if name == "fmod":
+            quotient = a / b
+            side = self._side(quotient)
+            return None if side is None else a - b * (side * self._mode(side * quotient, 1.0)[0])
+        side = self._side(a if len(args) == 1 else a - b, is_sign=name == "sign")
+        if side is None:
+            return None
+        if name == "sign":
+            return side
+        if name == "abs":
+            return side * a
+        below = 0.5 * (1.0 - side)
+        if name in COMPARED:
+            return below
+        return cg.where(below, a, b) if name == "minimum" else cg.where(below, b, a)
+
+    def _side(self, g: Node, *, is_sign: bool = False) -> Node | None:
+        """The sign of g as a mode, shared by what is g but for a constant factor; None where it is never zero."""
+        sign = 1.0
+        while True:
+            if g.op.name == "neg":
+                g, sign = g.args[0], -sign
+            elif g.op.name == "mul" and (factor := g.args[0].value):
+                g, sign = g.args[1], math.copysign(sign, factor * sign)
+            elif g.op.name == "sub" and (g.args[0].value is not None or g.args[0].serial > g.args[1].serial):
+                g, sign = g.args[1] - g.args[0], -sign
+            else:
+                break
+        if g.value is not None:
+            return cg.constant(math.copysign(sign, g.value * sign)) if g.value else None
+        if _excludes_zero(g):
+            return None
+        mode, surface = self._mode(g, 2.0)
+        surface.is_sign |= is_sign
+        return mode if sign > 0.0 else -mode
+
+    def _mode(self, g: Node, spacing: float) -> tuple[Node, _Surface]:
+        if (g, spacing) not in self._surfaces:
+            (mode,) = new_variables("mode", 1, self._taken)
+            self._taken.append(str(mode.name))
+            self._surfaces[g, spacing] = _Surface(mode, g, g if spacing == 2.0 else g - mode, spacing)
+        surface = self._surfaces[g, spacing]
+        return surface.mode, surface
+
+
+def _excludes_zero(g: Node) -> bool:
+    """Whether g is on one side of zero for any values of its variables."""
+    anything, bounds = (-math.inf, math.inf), dict[Node, tuple[float, float]]()
+    for node in topological([g]):
+        op = columns(node.op)
+        if node.value is not None:
+            bounds[node] = (node.value, node.value)
+        elif not node.args or op.interval is None:
+            bounds[node] = anything
+        elif len(node.args) == 2 and node.args[0] is node.args[1] and op.interval_of_same is not None:
+            bounds[node] = op.interval_of_same(bounds[node.args[0]])
+        else:
+            bounds[node] = op.interval(*[bounds[arg] for arg in node.args])
+    low, high = bounds[g]
+    return low > 0.0 or high < 0.0
+
+
+@kept_by_first
+def sliding(problem: Problem, among: frozenset[int]) -> Problem:
+    """A problem in modes that slides on those surfaces, `among` others, whose modes are half way between two sides.
+
+    Its parameters are the same. Each step ends on the surfaces, moved there along the difference of the rates.
+    """
+    switches = problem.switches
+    assert switches is not None
+    build, m = Builder(), problem.size
+    inputs = problem.rate.inputs
+    modes, states = inputs[len(inputs) - len(switches.modes) :], inputs[:m]
+    rates, gaps = list(problem.rate.outputs.values()), list(switches.gaps.outputs.values())
+    chosen = sorted(among)
+    with building(build):
+        # of a mode that slides, h = 1, the lower side, else its own
+        holds = [_slides(modes[k], switches.spacing[k]) for k in chosen]
+        lower = {modes[k]: modes[k] - 0.5 * switches.spacing[k] * hold for k, hold in zip(chosen, holds, strict=True)}
+    first, *others = [
+        folded([*rates, *[gaps[k] for k in chosen]], build, side)
+        for side in (lower, *[lower | {modes[k]: lower[modes[k]] + switches.spacing[k]} for k in chosen])
+    ]
+    f, g = first[:m], first[m:]
+    time = {inputs[m]: cg.constant(1.0)}
+    with building(build):
+        # g of the upper end of a floor's lower side
+        g = [gap - hold if switches.spacing[k] == 1.0 else gap for k, hold, gap in zip(chosen, holds, g, strict=True)]
+        jumps = [[there - here for there, here in zip(other[:m], f, strict=True)] for other in others]
+    drift = _along(g, dict(zip(states, f, strict=True)) | time, build)
+    columns_of = [_along(g, dict(zip(states, jump, strict=True)), build) for jump in jumps]
+    with building(build):
+        matrix = [
+            [cg.where(holds[i] * holds[j], column[i], 1.0 if i == j else 0.0) for j, column in enumerate(columns_of)]
+            for i in range(len(chosen))
+        ]
+        rights = [[cg.where(h, -value, 0.0) for h, value in zip(holds, part, strict=True)] for part in (drift, g)]
+        shares, moves = _solved(matrix, rights)
+        rate = [_mixed(each, shares, [jump[i] for jump in jumps]) for i, each in enumerate(f)]
+        onto = [_mixed(each, moves, [jump[i] for jump in jumps]) for i, each in enumerate(states)]
+        margins, turns = list[Node](), list[tuple[int, int]]()
+        place = {k: (hold, share) for k, hold, share in zip(chosen, holds, shares, strict=True)}
+        for (k, way), margin in zip(switches.turns, switches.margins.outputs.values(), strict=True):
+            if k not in place:
+                margins.append(margin)
+                turns.append((k, way))
+                continue
+            hold, share = place[k]
+            for side, inside in ((-1, share), (1, 1.0 - share)):
+                if way in (0, side):
+                    own = margin if way or side < 0 else cg.constant(1.0)
+                    margins.append(cg.where(hold, inside, own))
+                    turns.append((k, side))
+    made = replace(switches, margins=_numbered(inputs, margins), turns=tuple(turns))
+    project = _numbered(inputs, onto)
+    if problem.projection is not None:
+        nodes = list(problem.projection.outputs.values())
+        project = _numbered(inputs, folded(list(project.outputs.values()), build, dict(zip(states, nodes, strict=True))))
+    outputs = dict(zip(problem.rate.outputs, rate, strict=True))
+    return replace(problem, rate=Graph(inputs, outputs), projection=project, switches=made)
+
+
+def _slides(mode: Node, spacing: float) -> Node:
+    """1 where a mode is half way between two sides, else 0."""
+    return 1.0 - mode * mode if spacing == 2.0 else 2.0 * (mode - cg.floor(mode))
+
+
+def _along(g: Sequence[Node], seeds: Mapping[Node, Node], build: Builder) -> list[Node]:
+    """The derivatives of quantities along a direction."""
+    found = tangents({node: seed for node, seed in seeds.items() if seed.value != 0.0}, list(g), build)
+    return [found.get(node, cg.constant(0.0)) for node in g]
+
+
+def _mixed(start: Node, shares: Sequence[Node], jumps: Sequence[Node]) -> Node:
+    """start + sum of share * jump."""
+    for share, jump in zip(shares, jumps, strict=True):
+        start = start + share * jump
+    return start
+
+
+def _solved(matrix: list[list[Node]], rights: list[list[Node]]) -> list[list[Node]]:
+    """The solutions of A w = b for several b, by elimination in the order as it is."""
+    n = len(matrix)
+    for k in range(n):
+        for i in range(k + 1, n):
+            factor = matrix[i][k] / matrix[k][k]
+            if factor.value == 0.0:
+                continue
+            matrix[i] = [*matrix[i][: k + 1], *[a - factor * b for a, b in zip(matrix[i], matrix[k], strict=True)][k + 1 :]]
+            for right in rights:
+                right[i] = right[i] - factor * right[k]
+    for right in rights:
+        for k in reversed(range(n)):
+            for j in range(k + 1, n):
+                right[k] = right[k] - matrix[k][j] * right[j]
+            right[k] = right[k] / matrix[k][k]
+    return rights

@@ -1,0 +1,261 @@
+"""Modes: the sides of the switching surfaces of a motion, as it goes on: which are crossed, and what holds after."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph._shared import Array, kept_by_first
+from cgraph.extend import Builder, tangents
+
+from ...integrators import Problem
+from ...integrators.switches import Switches, sliding
+from ..steps.dense_output import UNIT, StepBlock
+from .crossing_search import Crossing, Quantities, first_crossing, outputs_of, quantities
+from .event import rounding_errors
+
+AT_ONCE = 1e-11  # of the sizes of the states so far: by so much surfaces may be off that are met at one instant
+FEW = 5  # surfaces at an instant, of which all combinations are tried
+ROUNDS = 50  # of pivots for each of more
+STUCK = 20  # turns at one instant, besides three of each surface
+
+
+class Turn(NamedTuple):
+    """Instant at which modes turn, and the modes after it."""
+
+    t: float
+    modes: tuple[float, ...]
+    crossed: tuple[int, ...]  # surfaces that are crossed, or slid on from here, or left
+
+
+@kept_by_first
+def _drift(problem: Problem, order: int) -> Graph:
+    """The derivatives of that order of all gaps by the time along the motion."""
+    graph = problem.switches.gaps if order == 1 else _drift(problem, order - 1)  # type: ignore[union-attr]
+    states, rates = problem.rate.inputs[: problem.size], problem.rate.outputs.values()
+    seeds = dict(zip(states, rates, strict=True)) | {problem.rate.inputs[problem.size]: cg.constant(1.0)}
+    nodes = list(graph.outputs.values())
+    found = tangents(seeds, nodes, Builder())
+    return cg.simplify(Graph(graph.inputs, {f"{k}": found.get(node, cg.constant(0.0)) for k, node in enumerate(nodes)}))
+
+
+@kept_by_first
+def _gap_errors(problem: Problem) -> Graph:
+    gaps = problem.switches.gaps  # type: ignore[union-attr]
+    return rounding_errors(gaps, gaps.inputs[: problem.size + 1])
+
+
+class Modes:
+    """The sides of surfaces of one motion after another."""
+
+    def __init__(self, problem: Problem) -> None:
+        assert problem.switches is not None
+        self.plain, self._switches = problem, problem.switches
+        self.values = np.ones(len(self._switches.modes))
+        self.turns = list[Turn]()
+        self.failed = ""
+        self._spacing = np.array(self._switches.spacing)
+        self._signs = frozenset(np.flatnonzero(self._switches.signs).tolist())
+        self._among = self._signs
+        self.sizes = np.zeros(problem.size)
+        self._fresh = np.zeros(len(self.values), dtype=bool)
+        self._at = (np.nan, 0)  # the instant of the last turn, and how many there were at it
+
+    @property
+    def slid(self) -> Array:
+        """Whether the motion slides on each surface."""
+        halves = (self.values - 1.0) / self._spacing
+        return np.asarray(halves != np.floor(halves))
+
+    @property
+    def problem(self) -> Problem:
+        """The problem by which the motion goes on."""
+        return sliding(self.plain, self._among) if self.slid.any() else self.plain
+
+    def see(self, x: Array) -> None:
+        """States (.., m) that the motion has come to."""
+        self.sizes = np.fmax(self.sizes, np.abs(x).reshape(-1, len(self.sizes)).max(axis=0))
+
+    def begin(self, t: float, x: Array, p: Sequence[float]) -> None:
+        """The sides at a start."""
+        self.failed, self.sizes, self._at = "", np.abs(x), (np.nan, 0)
+        self.values = np.where(self._spacing == 2.0, 1.0, 0.0)
+        for _ in range(len(self.values) + 1):
+            before, gaps = self.values, self._gaps(t, x, p)
+            sides = np.where(gaps < 0.0, -1.0, 1.0)
+            self.values = np.where(self._spacing == 2.0, sides, self.values + np.floor(gaps))
+            if np.array_equal(before, self.values):
+                break
+        self._decide(t, x, p, np.zeros(len(self.values), dtype=bool))
+
+    def first_crossing(self, block: StepBlock, p: Sequence[float]) -> tuple[Crossing | None, bool]:
+        """Where a surface is crossed in these steps, or a slide ends."""
+        watched, turns = self._watched
+        fresh = self._fresh[[k for k, _ in turns]]
+        found = first_crossing(watched, np.array([*p, *self.values]), block, fresh)
+        self._fresh[:] = False
+        return found
+
+    def turn(self, t: float, x: Array, p: Sequence[float], number: int) -> None:
+        """Turn the mode of a margin that is zero at this state, and what else is due there."""
+        k, way = self._watched[1][number]
+        crossed = np.zeros(len(self.values), dtype=bool)
+        crossed[k] = True
+        slid, spacing = self.slid[k], self._spacing[k]
+        change = way * 0.5 * spacing if slid else -2.0 * self.values[k] if spacing == 2.0 else way
+        self.values = self.values.copy()
+        self.values[k] += change
+        again = self._at[1] + 1 if abs(t - self._at[0]) <= 8.0 * np.spacing(abs(t)) else 0
+        self._at = (t, again)
+        if again > STUCK + 3 * len(self.values):
+            self.failed = f"stopped at t = {t:.6g} s: surfaces turn again and again there"
+            return
+        self._decide(t, x, p, crossed)
+
+    @property
+    def _watched(self) -> tuple[Quantities, tuple[tuple[int, int], ...]]:
+        switches = self.problem.switches
+        assert isinstance(switches, Switches)
+        return quantities(switches.margins, self.plain.size), switches.turns
+
+    def _point(self, t: float, x: Array, p: Sequence[float], modes: Array) -> Array:
+        """Inputs (.., N) of a graph at modes (k, N)."""
+        fixed = np.concatenate([x, [t], p])[:, None]
+        return np.concatenate([np.broadcast_to(fixed, (len(fixed), modes.shape[1])), modes])
+
+    def _gaps(self, t: float, x: Array, p: Sequence[float]) -> Array:
+        return outputs_of(self._switches.gaps, self._point(t, x, p, self.values[:, None]))[:, 0]
+
+    def _decide(self, t: float, x: Array, p: Sequence[float], crossed: Array) -> None:
+        """What holds from here on, of the surfaces at zero; crossed: those of which the mode has turned."""
+        gaps = self._gaps(t, x, p)
+        errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))
+        point = np.append(self._point(t, x, p, self.values[:, None])[:, 0], errors)
+        allowed = outputs_of(_gap_errors(self.plain), point[:, None])[:, 0]
+        slid, floors = self.slid, self._spacing == 1.0
+        upper_end = floors & ~slid & (np.abs(gaps - 1.0) <= allowed)
+        zero = (np.abs(gaps - np.where(floors & slid, 0.5, 0.0)) <= allowed) | upper_end | crossed | slid
+        self._fresh = zero.copy()
+        if zero.any():
+            among = np.flatnonzero(zero)
+            half = 0.5 * self._spacing[among]
+            middle = np.where(slid[among], self.values[among], self.values[among] - half * np.where(floors[among], 1.0, self.values[among]))
+            middle = np.where(upper_end[among], self.values[among] + half, middle)
+            # a floor that has turned down is at the upper end of its side
+            down = floors[among] & crossed[among] & (gaps[among] > 0.5)
+            middle = np.where(down, self.values[among] + half, middle)
+            found = _Choice(self, t, x, p, among, middle, half, crossed[among]).found()
+            if found is None:
+                self.failed = f"stopped at t = {t:.6g} s: no sides of the surfaces there let the motion go on"
+                return
+            self.values = self.values.copy()
+            self.values[among] = found
+            slid = self.slid
+            self._among = self._among | frozenset(np.flatnonzero(slid).tolist())
+        self.turns.append(Turn(t, tuple(self.values.tolist()), tuple(np.flatnonzero(crossed).tolist())))
+
+
+class _Choice:
+    """The choice of sides of surfaces `among` all, (n,), each at middle -+ half, or sliding at middle."""
+
+    def __init__(
+        self, of: Modes, t: float, x: Array, p: Sequence[float], among: Array, middle: Array, half: Array, crossed: Array
+    ) -> None:
+        self._of, self._t, self._x, self._p = of, t, x, p
+        self._among, self._middle, self._half, self._crossed = among, middle, half, crossed
+        self._known: dict[tuple[int, ...], tuple[Array, Array]] = {}
+
+    def found(self) -> Array | None:
+        """Modes that hold; None if none do."""
+        n, now = len(self._among), self._of.values[self._among]
+        wanted = np.sign(now - self._middle).astype(int).tolist()
+        if n > FEW:
+            return self._pivoted(wanted)
+        options = [[want, -want, 0] if want else [0, 1, -1] for want in wanted]
+        combinations = sorted(
+            itertools.product(*options),
+            key=lambda each: (
+                sum([side == 0 and want != 0 for side, want in zip(each, wanted, strict=True)]),
+                sum([side != want for side, want in zip(each, wanted, strict=True)]),
+            ),
+        )
+        for each in combinations:
+            if not self._wrong(each):
+                return self._modes(each)
+        return None
+
+    def _modes(self, sides: Sequence[int]) -> Array:
+        return np.asarray(self._middle + self._half * np.array(sides))
+
+    def _drifts(self, sides: Sequence[int]) -> tuple[Array, Array]:
+        """How the gaps move with these sides, none of which is 0, and what of it is rounding, (n,) each."""
+        key = tuple(sides)
+        if key not in self._known:
+            modes = self._of.values.copy()
+            modes[self._among] = self._modes(sides)
+            ways = np.array([[0.0] * len(self._x), *_signs(len(self._x))]).T
+            states = self._x[:, None] + AT_ONCE * self._of.sizes[:, None] * ways
+            fixed = np.concatenate([[self._t], self._p, modes])[:, None]
+            points = np.concatenate([states, np.broadcast_to(fixed, (len(fixed), ways.shape[1]))])
+            values = outputs_of(_drift(self._of.plain, 1), points)[self._among]
+            off = 4.0 * np.abs(values[:, 1:] - values[:, :1]).max(axis=1) + 16.0 * UNIT * np.abs(values[:, 0])
+            self._known[key] = values[:, 0], off
+        return self._known[key]
+
+    def _second(self, sides: Sequence[int]) -> Array:
+        modes = self._of.values.copy()
+        modes[self._among] = self._modes(sides)
+        point = self._of._point(self._t, self._x, self._p, modes[:, None])
+        return outputs_of(_drift(self._of.plain, 2), point)[self._among, 0]
+
+    def _wrong(self, sides: Sequence[int]) -> list[tuple[int, int]]:
+        """Surfaces that do not let the motion go on with these sides, and where they send it."""
+        base = [side or -1 for side in sides]
+        slides = [k for k, side in enumerate(sides) if side == 0]
+        drift, off = self._drifts(base)
+        wrong = list[tuple[int, int]]()
+        if slides:
+            columns = [self._drifts([*base[:k], 1, *base[k + 1 :]])[0] - drift for k in slides]
+            matrix = np.array(columns).T
+            with np.errstate(all="ignore"):
+                shares = np.linalg.lstsq(matrix[slides], -drift[slides], rcond=None)[0]
+                left = np.abs(drift[slides] + matrix[slides] @ shares)
+            for i, k in enumerate(slides):
+                scale = abs(columns[i][k])
+                slack = 1e-9 if scale > 0.0 else 0.0
+                if not columns[i][k] < -off[k] or not left[i] <= 1e-9 * scale:
+                    wrong.append((k, 1 if drift[k] > 0.0 else -1))
+                elif not -slack <= shares[i] <= 1.0 + slack:
+                    wrong.append((k, 1 if shares[i] > 0.5 else -1))
+            drift = drift + matrix @ shares
+        second: Array | None = None
+        for k, side in enumerate(sides):
+            if side and not side * drift[k] > off[k]:
+                if side * drift[k] < -off[k]:
+                    wrong.append((k, -side))
+                elif not slides:
+                    second = self._second(sides) if second is None else second
+                    if side * second[k] < 0.0:
+                        wrong.append((k, -side))
+        return wrong
+
+    def _pivoted(self, wanted: Sequence[int]) -> Array | None:
+        """Sides by pivots: the first that is wrong slides, or leaves its slide."""
+        sides = [0 if not crossed else want for want, crossed in zip(wanted, self._crossed, strict=True)]
+        for _ in range(ROUNDS * len(sides)):
+            wrong = self._wrong(sides)
+            if not wrong:
+                return self._modes(sides)
+            k, way = min(wrong)
+            sides[k] = way if sides[k] == 0 else 0
+        return None
+
+
+def _signs(m: int) -> list[list[float]]:
+    """Two patterns of signs."""
+    return [[1.0] * m, [1.0 if k % 2 else -1.0 for k in range(m)]]
