@@ -13,6 +13,8 @@ triangle of second derivatives, all as nodes. `compressed_jacobian` gives the pa
 `jets` the Taylor coefficients of a solution and `straight` all of them as one graph; `NoSeriesError` says that an
 operation has none.
 
+**Bound**: `enclosure` gives bounds of the outputs over boxes of the inputs, as a graph.
+
 **Solve**: `solve_nodes` is `cg.hessian_solve` on nodes; it raises `SingularError`.
 
 **Read**: `Names` tells nodes in a person's words, `Formulas` gives the equations of nodes in a `Notation`.
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
     from .core.traversal import topological as topological
     from .explain.lint.cancellation import certain_digits as certain_digits
     from .explain.names import Names as Names
+    from .operations.enclosure import enclosure as enclosure
     from .operations.operation import MathML as MathML, Op as Op
     from .operations.register import register as register
     from .operations.table import OPS as OPS

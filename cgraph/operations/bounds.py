@@ -6,9 +6,10 @@ Bounds are outward: they hold for real numbers, and for float64 whose library fu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from .operation import OPS, Interval
+from .operation import OPS, Interval, Op
 
 REAL_LINE: Interval = (-math.inf, math.inf)
 FLAG: Interval = (0.0, 1.0)
@@ -16,6 +17,15 @@ ULPS = 4  # C libraries in use stay within 2 (glibc manual, "Known Maximum Error
 _MAX_ANGLE = 2.0**20  # beyond, sine and cosine are taken for anything in [-1, 1]: the period's rounding would matter
 _MAX_FLOAT = math.nextafter(math.inf, 0.0)
 _SLACK = 1e-9  # by which an extremum of sine or cosine may lie outside an interval and is counted as inside
+
+
+def value_of(op: Op, arguments: Sequence[Interval], *, same: bool = False) -> Interval:
+    """The interval of an operation's value; `same`: its two arguments are one node."""
+    if op.interval is None:
+        return REAL_LINE
+    if same and op.interval_of_same is not None:
+        return op.interval_of_same(arguments[0])
+    return op.interval(*arguments)
 
 
 # Rounding outwards. A bound that is infinite by overflow alone becomes the largest number on the inner side.
@@ -110,32 +120,44 @@ def _meet(a: Interval, low: float, high: float) -> Interval | None:
     return kept if kept[0] <= kept[1] else None
 
 
-def rising(
-    name: str, domain: Interval = REAL_LINE, bounds: Interval = REAL_LINE, ulps: int = ULPS, *, falling: bool = False
-) -> Callable[[Interval], Interval]:
+@dataclass(frozen=True)
+class Rising:
     """The interval of a monotonic function on its domain; outside of it there is no number to bound."""
 
-    def value(a: Interval) -> Interval:
-        inside = _meet(a, *domain)
+    name: str
+    domain: Interval = REAL_LINE
+    bounds: Interval = REAL_LINE
+    ulps: int = ULPS
+    falling: bool = False
+
+    def __call__(self, a: Interval) -> Interval:
+        """Bounds of its value."""
+        inside = _meet(a, *self.domain)
         if inside is None:
             return REAL_LINE
-        first, last = inside[::-1] if falling else inside
-        return max(bounds[0], _end(name, first, _down, ulps)), min(bounds[1], _end(name, last, _up, ulps))
+        first, last = inside[::-1] if self.falling else inside
+        low, high = _end(self.name, first, _down, self.ulps), _end(self.name, last, _up, self.ulps)
+        return max(self.bounds[0], low), min(self.bounds[1], high)
 
-    return value
 
-
-def wave(name: str, top: float) -> Callable[[Interval], Interval]:
+@dataclass(frozen=True)
+class Wave:
     """The interval of a sine or cosine, whose maxima lie at top + 2 pi k."""
 
-    def value(a: Interval) -> Interval:
+    name: str
+    top: float
+
+    def __call__(self, a: Interval) -> Interval:
+        """Bounds of its value."""
         if not max(abs(a[0]), abs(a[1])) < _MAX_ANGLE:
             return -1.0, 1.0
-        low = -1.0 if _contains_turn(a, top + math.pi, math.tau) else min([_end(name, x, _down, ULPS) for x in a])
-        high = 1.0 if _contains_turn(a, top, math.tau) else max([_end(name, x, _up, ULPS) for x in a])
+        low = (
+            -1.0
+            if _contains_turn(a, self.top + math.pi, math.tau)
+            else min([_end(self.name, x, _down, ULPS) for x in a])
+        )
+        high = 1.0 if _contains_turn(a, self.top, math.tau) else max([_end(self.name, x, _up, ULPS) for x in a])
         return max(-1.0, low), min(1.0, high)
-
-    return value
 
 
 def _contains_turn(a: Interval, start: float, period: float) -> bool:
@@ -147,7 +169,7 @@ def tan(a: Interval) -> Interval:
     """Bounds of tan a, none beside a pole."""
     if _tan_pole(a):
         return REAL_LINE
-    return rising("tan")(a)
+    return Rising("tan")(a)
 
 
 def no_tangent(a: Interval) -> str | None:
@@ -161,7 +183,7 @@ def _tan_pole(a: Interval) -> bool:
 
 def cosh(a: Interval) -> Interval:
     """Bounds of cosh a."""
-    low, high = rising("cosh")(magnitude(a))
+    low, high = Rising("cosh")(magnitude(a))
     return max(low, 1.0), high
 
 

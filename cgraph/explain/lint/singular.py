@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from ...core.evaluation import box_interval
 from ...core.graph import Graph
 from ...core.node import CONSTANT, VARIABLE, Node
-from ...operations.bounds import REAL_LINE
+from ...operations.bounds import REAL_LINE, value_of
 from ...operations.operation import Interval, Op, columns
 from ...util.json_type import Json, json_number
 from ...util.require import require_mapping
@@ -35,15 +35,6 @@ def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
             same = len(node.args) == 2 and node.args[0] is node.args[1]
             found[node] = value_of(columns(node.op), [found[arg] for arg in node.args], same=same)
     return found
-
-
-def value_of(op: Op, arguments: list[Interval], *, same: bool = False) -> Interval:
-    """The interval of an operation's value; `same`: its two arguments are one node."""
-    if op.interval is None:
-        return REAL_LINE
-    if same and op.interval_of_same is not None:
-        return op.interval_of_same(arguments[0])
-    return op.interval(*arguments)
 
 
 def singular_at(op: Op, arguments: list[Interval]) -> str | None:

@@ -14,9 +14,9 @@ import dynamics as dyn
 from cgraph import lint
 from cgraph.core.node import apply
 from cgraph.explain.lint.cancellation import rounded
-from cgraph.explain.lint.singular import intervals, value_of
+from cgraph.explain.lint.singular import intervals
 from cgraph.explain.names import Names
-from cgraph.operations.bounds import REAL_LINE
+from cgraph.operations.bounds import REAL_LINE, value_of
 from cgraph.operations.operation import OPS
 from tests import high_precision
 from tests.each_row import each_row
