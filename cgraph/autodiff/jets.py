@@ -269,6 +269,9 @@ class _Jets:
         if op.series is not None:
             coefficient: Node | None = op.series(self, node, *node.args)
             return coefficient
+        if op.name == "where" and at[0] is None:
+            condition, *branches = node.args
+            return where(self.zero(condition), *[self._number(each) for each in branches])
         if op.piece is not None and self.exact:
             return self._piece(node)
         self._refuse(node)

@@ -105,7 +105,8 @@ class Stepper(ABC):
     def begin(self, x: Array, t0: float, t_end: float) -> None:
         """Start anew, from x (m,) at t0, on the way to t_end."""
         if self.modes is not None:
-            self._given = self._given if self.control is None else self.control.at(t0, x)
+            if self.control is not None:
+                self._given = self._controlled(self.control.at(t0, x))
             self.modes.begin(t0, x, self._given)
             self._enter_modes()
         self._numbers[:], self.status = self._zero, "" if self.modes is None else self.modes.failed
@@ -299,9 +300,13 @@ class Stepper(ABC):
 
     def _hold(self, control: Hold, t_end: float) -> float:
         """Take the forces of the period of control that begins; when it ends, or the run."""
-        self.set_parameters(control.at(self.t, self.x))
+        self.set_parameters(self._controlled(control.at(self.t, self.x)))
         self.runner.write(self._memory, "p", self.parameters)
         return next(control.ends(self.t, t_end))
+
+    def _controlled(self, forces: Sequence[float]) -> list[float]:
+        """The parameters, with these forces in place of the first."""
+        return [*forces, *self._given[len(forces) :]]
 
     def _number(self, name: str) -> float:
         return float(self._numbers[self._at[name]])

@@ -188,7 +188,8 @@ def touch(contact: Contact, body: KinematicChain, to: KinematicChain) -> Touch:
     stiffness, dissipation, friction, slow = (as_node(symbol(getattr(contact, name))) for name in CONTACT_QUANTITIES)
     touching = cg.less(0.0, depth)
     inside = cg.where(touching, depth, 1.0)  # apart, the slope of the root of 0 would be infinite
-    pressed = cg.where(touching, stiffness * inside * cg.sqrt(inside), 0.0)
+    # a step that leaves the surface has stages beyond it, where the law goes on
+    pressed = cg.where(touching, stiffness * inside * cg.sqrt(cg.hypot(inside, 0.0)), 0.0)
     energy = 0.4 * pressed * inside
     if not vanishes(contact.dissipation):
         pressed = pressed * cg.maximum(1.0 - dissipation * rate, 0.0)

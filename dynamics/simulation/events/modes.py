@@ -26,11 +26,13 @@ STUCK = 20  # turns at one instant, besides three of each surface
 
 
 class Turn(NamedTuple):
-    """Instant at which modes turn, and the modes after it."""
+    """Instant from which modes hold."""
 
     t: float
     modes: tuple[float, ...]
-    crossed: tuple[int, ...]  # surfaces that are crossed, or slid on from here, or left
+    among: frozenset[int]  # surfaces of which some are slid on, if any is
+    slid: bool
+    number: int  # of the margin that was zero there; -1 at a start
 
 
 @kept_by_first
@@ -115,7 +117,7 @@ class Modes:
         if again > STUCK + 3 * len(self.values):
             self.failed = f"stopped at t = {t:.6g} s: surfaces turn again and again there"
             return
-        self._decide(t, x, p, crossed)
+        self._decide(t, x, p, crossed, number)
 
     @property
     def _watched(self) -> tuple[Quantities, tuple[tuple[int, int], ...]]:
@@ -131,7 +133,7 @@ class Modes:
     def _gaps(self, t: float, x: Array, p: Sequence[float]) -> Array:
         return outputs_of(self._switches.gaps, self._point(t, x, p, self.values[:, None]))[:, 0]
 
-    def _decide(self, t: float, x: Array, p: Sequence[float], crossed: Array) -> None:
+    def _decide(self, t: float, x: Array, p: Sequence[float], crossed: Array, number: int = -1) -> None:
         """What holds from here on, of the surfaces at zero; crossed: those of which the mode has turned."""
         gaps = self._gaps(t, x, p)
         errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))
@@ -157,7 +159,15 @@ class Modes:
             self.values[among] = found
             slid = self.slid
             self._among = self._among | frozenset(np.flatnonzero(slid).tolist())
-        self.turns.append(Turn(t, tuple(self.values.tolist()), tuple(np.flatnonzero(crossed).tolist())))
+        self.turns.append(Turn(t, tuple(self.values.tolist()), self._among, bool(slid.any()), number))
+
+    def arrival(self, before: Turn, turn: Turn) -> Graph:
+        """The margin that is zero where modes turn."""
+        problem = sliding(self.plain, before.among) if before.slid else self.plain
+        switches = problem.switches
+        assert switches is not None
+        margin = list(switches.margins.outputs.values())[turn.number]
+        return Graph(switches.margins.inputs, {"margin": margin})
 
 
 class _Choice:

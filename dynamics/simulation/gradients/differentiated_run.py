@@ -19,12 +19,11 @@ from cgraph import Graph
 from cgraph._shared import Array, Tape, kept_by_first, run_passes
 from cgraph.extend import Runner
 
-from ..events.event import WatchedEvent
 from ..outcome import MotionError
 from ..stepper import nonfinite, unsolved
 from ..steps.row_values import values_of
 from .motion_programs import LOSS, motion_programs, pullback
-from .motions import TORQUE, Motions, Stretch
+from .motions import TORQUE, Arrival, Motions, Stretch
 
 MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
 PIECE = 4096  # passes between two looks at Python
@@ -36,16 +35,14 @@ MOST_TURNS = 20  # of Newton's method for the length of a step that arrives at a
 class Segment:
     """Steps that were run: tapes of what is before the first one, if anything, and of them; (m, N) before and after."""
 
+    motions: Motions  # by the equations of these steps
     steps: Stretch
+    before: list[Array]  # states to which graphs of their entry are applied
     start: Tape | None
     tape: Tape
+    failed: str
     begin: Array
     x: Array
-
-    @property
-    def reset(self) -> Graph | None:
-        """Reset of the state at the end."""
-        return self.steps.event.reset if self.steps.event else None
 
 
 class DifferentiatedRun:
@@ -60,26 +57,19 @@ class DifferentiatedRun:
     def __init__(self, motions: Motions, *, forwards: bool = False, every: Sequence[int] = ()) -> None:
         self.motions, self.forwards = motions.with_steps(), forwards
         motions = self.motions
-        wrt = [TORQUE] if TORQUE in motions.wrt else []
-        wrt += (["p", "c"] if motions.by_parameters else []) + (["t", "h"] if motions.events else [])
-        self.programs = motion_programs(
-            motions.equations,
-            motions.options.integrator,
-            tuple(wrt),
-            motions.running,
-            motions.options.backend,
-            each_step=motions.each_step,
-            forwards=forwards,
-            many=motions.many > 1,
-        )
-        self.segments: list[Segment] = []
+        self._wrt = [TORQUE] if TORQUE in motions.wrt else []
+        moves = len(motions.steps) > 1 or motions.steps[0].arrival is not None
+        self._wrt += (["p", "c"] if motions.by_parameters else []) + (["t", "h"] if moves else [])
+        self.moves, self.segments, x = moves, list[Segment](), motions.x
         begin = float(motions.steps[0].t[0])
-        x = self._state(motions.equations.start, motions.x, begin)
         for stretch, kept in zip(motions.steps, every or itertools.repeat(0), strict=False):
             segment = self._segment(stretch.beginning_at(begin), x, kept)
             self.segments.append(segment)
-            begin = float(segment.steps.t[-1])
-            x = self._state(segment.reset, segment.x, begin)
+            begin, x = float(segment.steps.t[-1]), segment.x
+        self._before_end = list[Array]()
+        for graph in self.motions.after:
+            self._before_end.append(x)
+            x = self._state(self.segments[-1].motions, graph, x, begin)
         self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
         self.loss = np.zeros(motions.many)
         if motions.running is not None:
@@ -88,7 +78,7 @@ class DifferentiatedRun:
     @property
     def end(self) -> Array:
         """The end of the motions in q and qd, (m, N)."""
-        return self._state(self.motions.equations.end, self.x, float(self.t[-1]))
+        return self._state(self.segments[-1].motions, self.motions.equations.end, self.x, float(self.t[-1]))
 
     @property
     def checkpoints(self) -> int:
@@ -97,8 +87,21 @@ class DifferentiatedRun:
 
     def _segment(self, steps: Stretch, x: Array, every: int) -> Segment:
         """Run steps from the state x on."""
-        motions, many, count = self.motions, self.motions.many, len(steps.h)
-        before, step, failed = self.programs
+        motions, many, count = self.motions.in_stretch(steps), self.motions.many, len(steps.h)
+        entered = list[Array]()
+        for graph in steps.entry:
+            entered.append(x)
+            x = self._state(motions, graph, x, float(steps.t[0]))
+        before, step, failed = motion_programs(
+            motions.equations,
+            motions.options.integrator,
+            tuple(self._wrt),
+            motions.running,
+            motions.options.backend,
+            each_step=motions.each_step,
+            forwards=self.forwards,
+            many=many > 1,
+        )
         tau = motions.tau[0] if motions.each_step else motions.tau
         values = motions.equations.registers(np.concatenate([tau, motions.values])) | {"t": steps.t[:1], "x": x}
         if motions.options.adaptive and not failed:  # rtol = 0: what is iterated is solved to rounding
@@ -119,10 +122,10 @@ class DifferentiatedRun:
 
         fits = every > 0 or 8 * step.forward.program.width * count * many <= MOST_RECORDED
         tape = Tape(step, values, fed, many, 0 if fits else math.ceil(math.sqrt(count)), every or 1)
-        segment = Segment(steps, start, tape, tape.value("x"), x)
-        tape.run(0, count - bool(steps.event))
-        if steps.event:
-            self._arrive(segment, steps.event)
+        segment = Segment(motions, steps, entered, start, tape, failed, tape.value("x"), x)
+        tape.run(0, count - bool(steps.arrival))
+        if steps.arrival:
+            self._arrive(segment, steps.arrival)
         segment.x = tape.value("x")
         bad = ~np.isfinite(segment.x).all(axis=0)
         if failed:
@@ -132,16 +135,17 @@ class DifferentiatedRun:
         segment.x[:, bad] = np.nan
         return segment
 
-    def _arrive(self, segment: Segment, event: WatchedEvent) -> None:
+    def _arrive(self, segment: Segment, event: Arrival) -> None:
         """Make the last step of a segment, as long as it takes to where the event happens."""
+        motions = segment.motions
         t, h, tape, count, last = segment.steps.t, segment.steps.h, segment.tape, len(segment.steps.h), np.inf
         before = float(t[-2])
         for _ in range(MOST_TURNS):
             memory = tape.memory.copy()
             run_passes(tape.of.forward, memory, 1, 1, tape.feed(count - 1, count))
             x = tape.value("x", memory)
-            point = self.motions.point(x, t[-1])
-            slopes, x_dot = self._slopes(event, x, t[-1]), _outputs(self.motions.problem.rate, point)
+            point = motions.point(x, t[-1])
+            slopes, x_dot = self._slopes(motions, event, x, t[-1]), _outputs(motions.problem.rate, point)
             # Newton's method: h -= g / (dg/dx xdot + dg/dt)
             change = float((_outputs(event.values, point) / (slopes[: len(x)].T @ x_dot + slopes[len(x)]))[0, 0])
             if not abs(change) < last:
@@ -150,7 +154,7 @@ class DifferentiatedRun:
             h[-1] -= change
             t[-1] = before + h[-1]
         if not np.isfinite(h[-1]):
-            raise MotionError(f"event {event.name!r} at t = {before:.6g} s does not pass through zero with a slope")
+            raise MotionError(f"{event.name} at t = {before:.6g} s does not pass through zero with a slope")
         tape.run(count - 1, count)
 
     def stopped(self, k: int, segment: Segment) -> str:
@@ -161,7 +165,7 @@ class DifferentiatedRun:
             last = min(first + PIECE, len(segment.steps.h))
             # a row ends with the state after the step
             rows = run_passes(tape.of.forward, memory, last - first, 1, tape.feed(first, last))[:, :, k]
-            bad = ~np.isfinite(rows[:, -m:]).all(axis=1) | (rows[:, -m - 1] != 0.0 if self.programs[-1] else False)
+            bad = ~np.isfinite(rows[:, -m:]).all(axis=1) | (rows[:, -m - 1] != 0.0 if segment.failed else False)
             if bad.any():
                 break
             before = rows[-1, -m:]
@@ -181,12 +185,15 @@ class DifferentiatedRun:
 
     def cotangents(self, bars: Array) -> tuple[Array, Array]:
         """Cotangents (m + 1 + .., N) of start, t and inputs, from those of the end; and rows of forces of each step."""
-        m, motions = len(self.x), self.motions
+        m, later, rows = len(self.x), 0.0, np.empty(0)
+        last, forces = self.segments[-1], self.motions.equations.forces
+        total = np.zeros_like(self.motions.tau) if self.motions.each_step else None
+        for graph, x in zip(reversed(self.motions.after), reversed(self._before_end), strict=True):
+            bars = self._cotangents_at(last.motions, graph, x, float(self.t[-1]), bars)
         for k, segment in reversed(list(enumerate(self.segments))):
-            steps, end, later = segment.steps, segment.steps.t[-1], 0.0
-            bars = self._cotangents_at(segment.reset, segment.x, end, bars)
-            if steps.event:
-                g = self._slopes(steps.event, segment.x, end)
+            motions, steps, end, later = segment.motions, segment.steps, segment.steps.t[-1], 0.0
+            if steps.arrival:
+                g = self._slopes(motions, steps.arrival, segment.x, end)
                 # lambda with h_bar = x_bar dx/dh + t_bar + lambda (dg/dx dx/dh + dg/dt) = 0
                 slope = self._by_last_length(segment, g[:m]) + g[m]
                 bars = bars - (self._by_last_length(segment, bars[:m]) + bars[m]) / slope * g
@@ -197,18 +204,22 @@ class DifferentiatedRun:
                 vectors, _, failed = segment.start.cotangents(vectors)
                 self._require_solved(failed)
             t_bar = vectors.get("t", np.zeros((1, motions.many)))
+            if total is not None and rows.size:
+                np.add.at(total, slice(None) if steps.rows is None else steps.rows, rows[:, rows.shape[1] - forces :])
             if k:
                 # cotangents of the instants and lengths of the steps, to which the event adds at the last
                 t, h = rows[:, :2, 0].T.copy()
                 t[-1] += later
-                if steps.event:
+                if steps.arrival:
                     h[-1] = 0.0  # which the event determines
                 # begin_bar = sum over steps of t_bar dt/dbegin + h_bar dh/dbegin
                 t_bar = t_bar + (t @ steps.by_t[:-1] + h @ steps.by_h)
             registers = motions.equations.registers(np.zeros_like(bars[m + 1 :]))
             inputs = np.concatenate([vectors.get(name, zero) for name, zero in registers.items()])
             bars = np.concatenate([vectors["x"], t_bar, bars[m + 1 :] + inputs])
-        return self._cotangents_at(motions.equations.start, motions.x, float(self.t[0]), bars), rows
+            for graph, x in zip(reversed(steps.entry), reversed(segment.before), strict=True):
+                bars = self._cotangents_at(motions, graph, x, float(steps.t[0]), bars)
+        return bars, rows if total is None else total
 
     def _by_last_length(self, segment: Segment, seed: Array) -> float:
         """Cotangent of h of the last step of one motion, from that of x (m, 1) after it: t and h are what varies."""
@@ -222,18 +233,19 @@ class DifferentiatedRun:
         dots: tangents (m + 1 + .., k) of the start, of t and of inputs, along k directions.
         """
         m, motions = len(self.x), self.motions
-        dots = self._tangents_at(motions.equations.start, motions.x, float(self.t[0]), dots)
         parts = []
         for segment in self.segments:
             steps, end = segment.steps, float(segment.steps.t[-1])
-            lengths = steps.by_h[:, None] * dots[m] if motions.events else np.empty((0, 0))
+            for graph, x in zip(steps.entry, segment.before, strict=True):
+                dots = self._tangents_at(segment.motions, graph, x, float(steps.t[0]), dots)
+            lengths = steps.by_h[:, None] * dots[m] if self.moves else np.empty((0, 0))
             times, moved = steps.by_t[:, None] * dots[m], dots
-            if steps.event:  # the last column: the length of the last step alone
+            if steps.arrival:  # the last column: the length of the last step alone
                 moved, lengths = (np.pad(each, ((0, 0), (0, 1))) for each in (dots, lengths))
                 lengths[-1], lengths[-1, -1] = 0.0, 1.0
             states, tangents = self._along(segment, moved, lengths)
-            if steps.event:
-                g = self._slopes(steps.event, segment.x, end)[:, 0]
+            if steps.arrival:
+                g = self._slopes(segment.motions, steps.arrival, segment.x, end)[:, 0]
                 tangents, slope = tangents[:, :, :-1], tangents[-1, :, -1]
                 # dg = dg/dx dx + dg/dt dt + dg/dp dp at fixed h, and dh = -dg / (dg/dx dx/dh + dg/dt)
                 length = -(g @ np.concatenate([tangents[-1], times[-2:-1], dots[m + 1 :]])) / (g[:m] @ slope + g[m])
@@ -242,8 +254,9 @@ class DifferentiatedRun:
                 times[-1] = times[-2] + length
             parts.append((steps.t, states, times, tangents))
             dots = np.concatenate([tangents[-1], times[-1:], dots[m + 1 :]])
-            dots = self._tangents_at(segment.reset, segment.x, end, dots)
-        if self.segments[-1].reset is not None:
+        for graph, x in zip(motions.after, self._before_end, strict=True):
+            dots = self._tangents_at(self.segments[-1].motions, graph, x, float(self.t[-1]), dots)
+        if motions.after:
             parts.append((self.t[-1:], self.x.T, dots[m : m + 1], dots[None, :m]))
         t, x, t_dot, x_dot = (np.concatenate(column) for column in zip(*parts, strict=True))
         if (graph := motions.equations.end) is not None:
@@ -259,7 +272,7 @@ class DifferentiatedRun:
         lengths: (steps, k), tangents of the lengths of the steps; none where these are constants.
         """
         tape, start, m, many = segment.tape, segment.start, len(self.x), dots.shape[1]
-        vectors = {"x": dots[:m], "t": dots[m : m + 1], **self.motions.equations.registers(dots[m + 1 :])}
+        vectors = {"x": dots[:m], "t": dots[m : m + 1], **segment.motions.equations.registers(dots[m + 1 :])}
         if start is not None:
             memory = start.derivative_memory(vectors, many)
             _run_all(start.of.derivative, memory, next(start.records(backwards=False))[2])
@@ -283,28 +296,24 @@ class DifferentiatedRun:
         if ((failed != 0.0) & np.isfinite(self.x).all(axis=0)).any():
             raise MotionError("the equations of a step's derivative were not solved: the step is too long")
 
-    def _slopes(self, event: WatchedEvent, x: Array, t: float) -> Array:
+    def _slopes(self, motions: Motions, event: Arrival, x: Array, t: float) -> Array:
         """Slopes of an event's quantity by x, t and inputs, (m + 1 + .., 1)."""
-        return _outputs(pullback(event.values), np.append(self.motions.point(x, t), [[1.0]], axis=0))
+        return _outputs(pullback(event.values), np.append(motions.point(x, t), [[1.0]], axis=0))
 
-    def _cotangents_at(self, graph: Graph | None, x: Array, t: float, bars: Array) -> Array:
+    def _cotangents_at(self, motions: Motions, graph: Graph, x: Array, t: float, bars: Array) -> Array:
         """Cotangents (m + 1 + .., N) of x, t and inputs, from those of the state that a graph makes of them."""
-        if graph is None:
-            return bars
-        before = _outputs(pullback(graph), np.concatenate([self.motions.point(x, t), bars[: len(x)]]))
+        before = _outputs(pullback(graph), np.concatenate([motions.point(x, t), bars[: len(x)]]))
         before[len(x) :] += bars[len(x) :]
         return before
 
-    def _tangents_at(self, graph: Graph | None, x: Array, t: float, dots: Array) -> Array:
+    def _tangents_at(self, motions: Motions, graph: Graph, x: Array, t: float, dots: Array) -> Array:
         """Tangents (m + 1 + .., k) of the state that a graph makes of x, t and inputs, and of t and inputs."""
-        if graph is None:
-            return dots
-        moved = values_of(_tangent(graph), [*self.motions.point(x, t), *dots], dots.shape[1])
+        moved = values_of(_tangent(graph), [*motions.point(x, t), *dots], dots.shape[1])
         return np.concatenate([moved, dots[len(x) :]])
 
-    def _state(self, graph: Graph | None, x: Array, t: float) -> Array:
+    def _state(self, motions: Motions, graph: Graph | None, x: Array, t: float) -> Array:
         """The states (m, N) that a graph over the states, t and parameters makes of some; the same without a graph."""
-        return x if graph is None else _outputs(graph, self.motions.point(x, t))
+        return x if graph is None else _outputs(graph, motions.point(x, t))
 
 
 def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:

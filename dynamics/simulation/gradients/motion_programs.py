@@ -21,11 +21,12 @@ from ...equations.substitute import substitute
 from ...integrators import Method, Problem
 from ...integrators.step import with_registers
 from ...integrators.step_control import equal_registers
+from ...integrators.switches import sliding
 from ...systems.arguments import TIME, new_variables
 from ..steps.step_program import normalizing
 from .rate_pullback import RatePullback, rate_pullback, sharing
 
-PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
+PARAMETERS = ("tau", "p", "c", "modes")  # registers: what the parameters of the problem are, end to end
 LOSS = "loss"  # register: the running loss so far
 OVER_INPUTS = ("rate", "projection", "momentum", "velocities", "missing")  # graphs of a problem over its parameters
 INPUTS = (*PARAMETERS, "t", "rtol", "atol")  # registers: what a motion has from without
@@ -36,7 +37,7 @@ _LATER = Graph([_T, _H], {"t": _T + _H})
 
 @dataclass(frozen=True, eq=False)
 class MotionEquations:
-    """A problem whose parameters are applied forces, p, and numbers c, which p alone decides.
+    """A problem whose parameters are applied forces, p, numbers c, which p alone decides, and modes.
 
     forces: how many of the parameters are applied forces.  names: of p.  numbers: p and c of p; None without c.
     start, end: (q, qd) to a state of the steps and back, over states, t, parameters; None where they are the same.
@@ -52,14 +53,22 @@ class MotionEquations:
 
     def registers(self, inputs: Array) -> dict[str, Array]:
         """The registers of the parameters, of these end to end."""
-        p = self.forces + len(self.names)
-        return dict(zip(PARAMETERS, (inputs[: self.forces], inputs[self.forces : p], inputs[p:]), strict=True))
+        p, modes = self.forces + len(self.names), len(inputs) - self.modes
+        parts = inputs[: self.forces], inputs[self.forces : p], inputs[p:modes], inputs[modes:]
+        return dict(zip(PARAMETERS, parts, strict=True))
+
+    @property
+    def modes(self) -> int:
+        """Number of modes."""
+        return 0 if self.problem.switches is None else len(self.problem.switches.modes)
 
 
 @kept_by_first
 def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     """The equations of a problem whose first `forces` parameters are applied forces."""
-    names, rule = problem.parameters[forces:], rate_pullback(problem)
+    switches, open_count = problem.switches, len(problem.parameters)
+    modes = () if switches is None else switches.modes
+    names, rule = problem.parameters[forces : open_count - len(modes)], None if modes else rate_pullback(problem)
     rates = problem.rate, problem.projection
     nodes = [node for graph in rates if graph for node in graph.outputs.values()] + [*(rule.nodes if rule else ())]
     p = cg.variables(list(names))
@@ -67,8 +76,11 @@ def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     new = dict(zip(nodes, changed, strict=True))
 
     def over_numbers(graph: Graph | None) -> Graph | None:
-        outputs = graph and {name: new.get(node, node) for name, node in graph.outputs.items()}
-        return graph and Graph([*graph.inputs, *numbers], outputs or {})
+        if graph is None:
+            return None
+        outputs = {name: new.get(node, node) for name, node in graph.outputs.items()}
+        first = len(graph.inputs) - len(modes)
+        return Graph([*graph.inputs[:first], *numbers, *graph.inputs[first:]], outputs)
 
     def whole(graph: Graph | None) -> Graph | None:
         """States to states, whose coordinates stay and whose last numbers the graph gives."""
@@ -76,10 +88,20 @@ def motion_equations(problem: Problem, forces: int) -> MotionEquations:
 
     graphs: dict[str, Any] = {name: over_numbers(getattr(problem, name)) for name in OVER_INPUTS}
     outputs = {str(variable.name): node for variable, node in numbers.items()}
-    made = replace(problem, parameters=(*problem.parameters, *outputs), multipliers=None, **graphs)
+    if switches is not None:
+        wide = {name: over_numbers(getattr(switches, name)) for name in ("gaps", "margins")}
+        graphs["switches"] = replace(switches, **wide)
+    parameters = (*problem.parameters[:forces], *names, *outputs, *modes)
+    made = replace(problem, parameters=parameters, multipliers=None, **graphs)
     rule = rule and replace(rule, inputs=made.rate.inputs, nodes=[new[node] for node in rule.nodes])
     over_p = Graph(p, dict(zip(names, p, strict=True)) | outputs) if outputs else None
     return MotionEquations(made, forces, names, over_p, rule, whole(made.momentum), whole(made.velocities))
+
+
+@kept_by_first
+def sliding_equations(equations: MotionEquations, among: frozenset[int]) -> MotionEquations:
+    """The equations of a motion that slides on some of these surfaces."""
+    return replace(equations, problem=sliding(equations.problem, among))
 
 
 def _apart(

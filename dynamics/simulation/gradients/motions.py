@@ -17,19 +17,22 @@ from cgraph.extend import Builder, topological
 from ...equations.state_equation import FORMS, StateInputs, state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Problem, derive, in_form, quantity
+from ...integrators.switches import switched
 from ...systems.arguments import TIME, Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System
-from ..applied_force import SampledController
-from ..events.event import Event, EventProgram, WatchedEvent, as_events, event_program
+from ..applied_force import Hold, SampledController
+from ..events.event import Event, EventProgram, as_events, event_program
+from ..events.modes import Turn
 from ..outcome import MotionError, Recorder
 from ..run import Run
 from ..run_options import METHOD, Options, Span, Steps, known_options, time_span
-from ..stepper import stepper_of
+from ..stepper import Stepper, stepper_of
+from ..steps.dense_output import Indices
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
-from .motion_programs import MotionEquations, motion_equations, outputs_at, pullback
+from .motion_programs import MotionEquations, motion_equations, outputs_at, pullback, sliding_equations
 
 Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"
@@ -37,7 +40,15 @@ LOSSES_KEPT = 64  # losses whose graphs stay for another run
 OPTIONS_KEPT = 16  # options and equal steps that stay for another run
 EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
 NOT_TAKEN = "max_steps", "dense_output", "fma", "progress"
+SAME_ROW = 1e-6  # of a step, by which it may begin before the row of its force
 _PLAIN = (float, int, str, bool, type(None))
+
+
+class Arrival(NamedTuple):
+    """What is zero at the end of steps: an event, or a surface that is crossed."""
+
+    name: str
+    values: Graph
 
 
 class Stretch(NamedTuple):
@@ -45,19 +56,25 @@ class Stretch(NamedTuple):
 
     t, h: (steps + 1,) and (steps,), where they begin and the last one ends, and their lengths.
     by_t, by_h: the derivatives of both by the instant at which they begin.
-    event: with which they end, if any; the last step is then as long as it takes to there.
+    arrival: with which they end, if any; the last step is then as long as it takes to there.
+    slides, modes: surfaces among which the motion slides, if it does, and the sides of all.  rows: of forces, of steps.
+    entry: graphs of the state from which they start, made of that before one after another.
     """
 
     t: Array
     h: Array
     by_t: Array
     by_h: Array
-    event: WatchedEvent | None = None
+    arrival: Arrival | None = None
+    slides: frozenset[int] | None = None
+    modes: tuple[float, ...] = ()
+    rows: Indices | None = None
+    entry: tuple[Graph, ...] = ()
 
     def beginning_at(self, t: float) -> Stretch:
         """The steps where they begin at another instant."""
         later = t - self.t[0]
-        if not (later or self.event):
+        if not (later or self.arrival):
             return self
         return self._replace(t=self.t + self.by_t * later, h=self.h + self.by_h * later)
 
@@ -66,25 +83,21 @@ class Stretch(NamedTuple):
         half, by_half = 0.5 * self.h, 0.5 * self.by_h
         ways = [(self.t, half), (self.by_t, by_half)]
         t, by_t = [np.append(np.stack([at[:-1], at[:-1] + each], axis=1), at[-1]) for at, each in ways]
-        return Stretch(t, np.repeat(half, 2), by_t, np.repeat(by_half, 2), self.event)
+        rows = None if self.rows is None else np.repeat(self.rows, 2)
+        return self._replace(t=t, h=np.repeat(half, 2), by_t=by_t, by_h=np.repeat(by_half, 2), rows=rows)
 
 
-def _stretch(t: Array, equal: int, end: float, event: WatchedEvent | None = None) -> Stretch:
-    """Steps that begin at t: chosen, or some of so many `equal` ones to the end."""
-    count = len(t) - 1
-    h, by_t, by_h = np.diff(t), np.zeros(count + 1), np.zeros(count)
-    if equal:
-        h[: count - bool(event)] = (end - t[0]) / equal
-        by_t[:-1], by_h[:] = 1.0 - np.arange(count) / equal, -1.0 / equal
-    else:
-        by_t[0], by_h[0] = 1.0, -1.0
-    return Stretch(t, h, by_t, by_h, event)
+def _stretch(t: Array, h: Array) -> Stretch:
+    """Steps that begin at t, whose first one ends where it does, wherever it begins."""
+    by_t, by_h = np.zeros(len(t)), np.zeros(len(h))
+    by_t[0], by_h[0] = 1.0, -1.0
+    return Stretch(t, h, by_t, by_h)
 
 
 @memo(OPTIONS_KEPT)
 def _equal_stretch(t0: float, t_end: float, count: int) -> Stretch:
     t = t0 + np.arange(count) * ((t_end - t0) / count)
-    return _stretch(np.append(t, t_end), count, t_end)
+    return _stretch(np.append(t, t_end), np.full(count, (t_end - t0) / count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +106,8 @@ class Motions:
 
     x: (m, N), where they start, in q and qd.  steps: none of chosen steps before they are run.
     tau: the applied forces that are inputs, (forces, N), or where they change with the steps, (steps, forces, N).
-    values: of the parameters p that stay inputs, and of the numbers c, (.., N).  said: doubts, a sentence each.
+    values: of the parameters p that stay inputs, of the numbers c and of modes, (.., N).  said: doubts, a sentence each.
+    after: graphs of a reset at the end of the last steps.
     """
 
     equations: MotionEquations
@@ -108,6 +122,7 @@ class Motions:
     events: EventProgram | None
     steps: tuple[Stretch, ...]
     said: tuple[str, ...] = ()
+    after: tuple[Graph, ...] = ()
 
     @property
     def problem(self) -> Problem:
@@ -149,7 +164,7 @@ class Motions:
             q = outputs_at(_by_displacements(problem.system), backend, np.concatenate([self.x[: problem.nq], q]))
         by = {START: q, VELOCITY: x[problem.nq :], TORQUE: inputs[: equations.forces]}
         if self.by_parameters:
-            of_p = inputs[equations.forces :]
+            of_p = inputs[equations.forces : len(inputs) - equations.modes]
             if equations.numbers is not None:
                 values = np.concatenate([self.values[: len(equations.names)], of_p])
                 of_p = outputs_at(pullback(equations.numbers), backend, values)
@@ -167,35 +182,88 @@ class Motions:
         """
         if self.steps:
             return self
-        problem, options, p = self.problem, self.options, self.inputs[:, 0]
+        problem, p, rows = self.problem, self.inputs[: len(self.inputs) - self.equations.modes, 0], None
         x = converted(problem.momentum, self.span.t0, self.x[:, 0], p)
-        run = stepper_of(problem, options, p.tolist(), events=self.events, dense=bool(self.events))
+        if self.each_step:
+            names = problem.parameters[: self.equations.forces]
+            rows = Hold(_row_controller(self.tau[:, :, 0], self.span), names, problem.nq, self.span.t0)
+        options = self.options if rows is None else replace(self.options, dt=rows.controller.period)
+        run = stepper_of(problem, options, p.tolist(), events=self.events, dense=bool(self.events), control=rows)
         recorder = Recorder(x, self.span)
         with np.errstate(all="ignore"):
             for block in run.blocks(x, self.span):
                 recorder.record(block)
         if run.status:
             raise MotionError(f"the motion did not reach t_end, {run.status}")
-        return replace(self, steps=self._cut(recorder.table()[0], run.log, bool(run.event)), said=tuple(run.warnings))
+        steps, after = self._cut(recorder.table()[0], run)
+        return replace(self, steps=steps, after=after, said=tuple(run.warnings))
 
-    def _cut(self, times: Array, log: Any, ended: bool) -> tuple[Stretch, ...]:
-        """The accepted steps, between the events that reset the state or end the motion.
+    def in_stretch(self, steps: Stretch) -> Motions:
+        """The motion by the equations that hold in some of its steps."""
+        if not steps.modes:
+            return self
+        values = np.concatenate([self.values[: len(self.values) - len(steps.modes)], np.array(steps.modes)[:, None]])
+        equations = self.equations if steps.slides is None else sliding_equations(self.equations, steps.slides)
+        tau = self.tau if steps.rows is None else self.tau[steps.rows]
+        return replace(self, equations=equations, values=values, tau=tau)
+
+    def _cut(self, times: Array, run: Stepper) -> tuple[tuple[Stretch, ...], tuple[Graph, ...]]:
+        """The accepted steps, between the events that reset the state or end the motion, and crossings of surfaces.
+
+        And graphs of a reset after the last.
 
         times: (T,), the start, the ends of the steps, and an instant twice where an event resets the state.
         """
-        happened = [] if log is None else [(log.program.events[k], t) for k, t, _ in log.happened]
-        parts, options = np.split(times, np.flatnonzero(np.diff(times) == 0.0) + 1), self.options
-        stretches = []
-        for number, t in enumerate(parts):
+        happened = [] if run.log is None else [(run.log.program.events[k], t) for k, t, _ in run.log.happened]
+        turns = [] if run.modes is None else list(run.modes.turns)
+        parts, stretches = np.split(times, np.flatnonzero(np.diff(times) == 0.0) + 1), list[Stretch]()
+        entry = () if self.equations.start is None else (self.equations.start,)
+        for number, whole in enumerate(parts):
             resets = number < len(parts) - 1
-            at = [each for each, when in happened if when == t[-1] and (each.reset if resets else each.terminal)]
-            if (resets or ended) and len(at) != 1:
+            at = [each for each, when in happened if when == whole[-1] and (each.reset if resets else each.terminal)]
+            if (resets or run.event) and len(at) != 1:
                 names = ", ".join([each.name for each in at])
-                raise ValueError(f"events {names} happen at one instant, t = {t[-1]:.6g} s, which has no derivative")
-            count = 0 if options.adaptive else step_count(self.span.t_end - t[0], options.step)
-            if len(t) > 1:
-                stretches.append(_stretch(t, count, self.span.t_end, at[0] if resets or ended else None))
-        return tuple(stretches)
+                raise ValueError(f"events {names} happen at one instant, t = {whole[-1]:.6g} s, which has no derivative")
+            inside = [] if run.modes is None else np.flatnonzero(np.isin(whole, [turn.t for turn in turns]))
+            ends = [*[k for k in inside if 0 < k < len(whole) - 1], len(whole) - 1]
+            for k, (first, last) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
+                made = _stretch(whole[first : last + 1], np.diff(whole[first : last + 1]))
+                if run.modes is not None:
+                    turn, turns = _turn_at(turns, whole[first])
+                    slides = turn.among if turn.slid else None
+                    made = made._replace(slides=slides, modes=turn.modes)
+                    if slides is not None and k == 0:
+                        onto = sliding_equations(self.equations, slides).problem.projection
+                        entry = (*entry, onto) if onto else entry
+                    following = next((each for each in turns if each.t == whole[last]), None)
+                    if last < len(whole) - 1 and following is not None:
+                        name = "a surface that is crossed"
+                        made = made._replace(arrival=Arrival(name, run.modes.arrival(turn, following)))
+                if last == len(whole) - 1 and at:
+                    made = made._replace(arrival=Arrival(f"event {at[0].name!r}", at[0].values))
+                if last > first:
+                    rows = None
+                    if self.each_step:
+                        place = np.abs(made.t[:-1] - self.span.t0) / self.span.length * len(self.tau)
+                        rows = np.minimum((place + SAME_ROW).astype(np.intp), len(self.tau) - 1)
+                    stretches.append(made._replace(entry=entry, rows=rows))
+                    entry = ()
+            entry = (at[0].reset,) if resets and at[0].reset else ()
+        return tuple(stretches), entry
+
+
+def _turn_at(turns: Sequence[Turn], t: float) -> tuple[Turn, list[Turn]]:
+    """The last of the turns that come first and are at an instant, and those after it."""
+    count = 1
+    while count < len(turns) and turns[count].t == t:
+        count += 1
+    return turns[count - 1], list(turns[count:])
+
+
+def _row_controller(rows: Array, span: Span) -> SampledController:
+    """The forces of each of equal steps."""
+    h = span.length / len(rows)
+    return SampledController(lambda q, qd, t: rows[min(round(abs(t - span.t0) / h), len(rows) - 1)], h)
 
 
 class Differentiation:
@@ -250,7 +318,8 @@ class Differentiation:
         forces = names if forced or any([start.bound[name] != 0.0 for name in names]) else ()
         free = {*forces, *wrt, *(self._parameters or ())}  # what a caller changes from call to call stays an input
         derived = derive(run.applied.model, {name: value for name, value in start.bound.items() if name not in free})
-        equations, columns = motion_equations(in_form(derived, self._form), len(forces)), start.bound | start.varied
+        problem = switched(in_form(derived, self._form))
+        equations, columns = motion_equations(problem, len(forces)), start.bound | start.varied
         numbers = np.empty((len(forces) + len(equations.names), count))
         for row, name in zip(numbers, [*forces, *equations.names], strict=True):
             row[:] = columns[name]
@@ -259,11 +328,12 @@ class Differentiation:
             tau = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
         if equations.numbers is not None:
             values = outputs_at(equations.numbers, options.backend, values)
+        values = np.concatenate([values, np.ones((equations.modes, count))])
         final = _loss_graph(problem, "loss", self._losses[0])
         running = _loss_graph(problem, "running", self._losses[1], run.applied.nodes)
         watched = event_program(problem, self._events) if self._events else None
         steps: tuple[Stretch, ...] = ()
-        if not (options.adaptive or watched):
+        if not (options.adaptive or watched or equations.modes):
             by_rows = rows is not None and options.dt is None
             steps_count = len(tau) if by_rows else step_count(span.length, options.step)
             steps = (_equal_stretch(span.t0, span.t_end, steps_count),)
