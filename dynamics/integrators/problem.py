@@ -46,6 +46,7 @@ class Problem:
     momentum: Graph | None = None  # p of q and qd, inputs in place of the states; None of states q and qd
     missing: Graph | None = None  # what the velocities leave of the momenta; None where they are not iterated
     switches: Switches | None = None  # of a problem in modes, see `switched`
+    slides: bool = False  # whether it may slide on some of its surfaces, see `sliding`
 
     @property
     def size(self) -> int:

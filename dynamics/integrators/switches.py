@@ -110,10 +110,13 @@ class _Surface:
 class _Reader:
     """Reads nodes into modes."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, known: Switches | None = None) -> None:
         self.build, self._taken = Builder(), [*problem.rate.input_names]
         self._surfaces: dict[tuple[Node, float], _Surface] = {}
-        self._smooth = frozenset[Node]()
+        self._places, self._known = _Places(), dict[tuple[int, float], Node]()
+        if known is not None:
+            of = zip(known.surfaces, known.spacing, cg.variables(list(known.modes)), strict=True)
+            self._known = {(self._places.of(g), spacing): mode for g, spacing, mode in of}
 
     def read(self, nodes: Sequence[Node]) -> list[Node]:
         """Copies of nodes with modes in place of what switches."""
@@ -186,6 +189,9 @@ class _Reader:
 
     def _mode(self, g: Node, spacing: float) -> tuple[Node, _Surface]:
         if (g, spacing) not in self._surfaces:
+            if self._known and (mode := self._known.get((self._places.of(g), spacing))) is not None:
+                self._surfaces[g, spacing] = _Surface(mode, g, g if spacing == 2.0 else g - mode, spacing)
+                return mode, self._surfaces[g, spacing]
             (mode,) = new_variables("mode", 1, self._taken)
             self._taken.append(str(mode.name))
             self._surfaces[g, spacing] = _Surface(mode, g, g if spacing == 2.0 else g - mode, spacing)
@@ -211,6 +217,31 @@ def _excludes_zero(g: Node) -> bool:
 
 
 @kept_by_first
+def in_modes(problem: Problem, graph: Graph) -> Graph:
+    """Another graph over states, t and parameters, of which what switches as the rate does is in its modes."""
+    if problem.switches is None:
+        return graph
+    reader = _Reader(problem, problem.switches)
+    return Graph(graph.inputs, dict(zip(graph.outputs, reader.read(list(graph.outputs.values())), strict=True)))
+
+
+class _Places:
+    """Numbers of nodes, the same for those of one structure."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[object, ...], int] = {}
+
+    def of(self, node: Node) -> int:
+        """Number of a node."""
+        places: dict[Node, int] = {}
+        for each in topological([node]):
+            leaf = each.name if each.value is None and not each.args else each.value
+            key = (each.op.name, leaf, *[places[arg] for arg in each.args])
+            places[each] = self._known.setdefault(key, len(self._known))
+        return places[node]
+
+
+@kept_by_first
 def sliding(problem: Problem, among: frozenset[int]) -> Problem:
     """A problem in modes that slides on those surfaces, `among` others, whose modes are half way between two sides.
 
@@ -220,7 +251,7 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
     assert switches is not None
     build, m = Builder(), problem.size
     inputs = problem.rate.inputs
-    modes, states = inputs[len(inputs) - len(switches.modes) :], inputs[:m]
+    modes, states = inputs[len(inputs) - len(switches.modes) :], list(inputs[:m])
     rates, gaps = list(problem.rate.outputs.values()), list(switches.gaps.outputs.values())
     chosen = sorted(among)
     with building(build):
@@ -248,6 +279,10 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         shares, moves = _solved(matrix, rights)
         rate = [_mixed(each, shares, [jump[i] for jump in jumps]) for i, each in enumerate(f)]
         onto = [_mixed(each, moves, [jump[i] for jump in jumps]) for i, each in enumerate(states)]
+        for hold, surface in zip(holds, [switches.surfaces[k] for k in chosen], strict=True):
+            if surface in states:  # a state that stays zero does so exactly
+                i = states.index(surface)
+                rate[i], onto[i] = cg.where(hold, 0.0, rate[i]), cg.where(hold, 0.0, onto[i])
         margins, turns = list[Node](), list[tuple[int, int]]()
         place = {k: (hold, share) for k, hold, share in zip(chosen, holds, shares, strict=True)}
         for (k, way), margin in zip(switches.turns, switches.margins.outputs.values(), strict=True):
@@ -267,7 +302,7 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         nodes = list(problem.projection.outputs.values())
         project = _numbered(inputs, folded(list(project.outputs.values()), build, dict(zip(states, nodes, strict=True))))
     outputs = dict(zip(problem.rate.outputs, rate, strict=True))
-    return replace(problem, rate=Graph(inputs, outputs), projection=project, switches=made)
+    return replace(problem, rate=Graph(inputs, outputs), projection=project, switches=made, slides=True)
 
 
 def _slides(mode: Node, spacing: float) -> Node:

@@ -39,6 +39,7 @@ from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import TIME, new_variables
 from .problem import Problem, reaches
 from .step import Step, Values, advanced, call, count, numbered, stage_time, summed, total
+from .switches import in_modes
 from .tableau import HALF, MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned
 
 TURNS = 60.0  # of the iteration for the stages, at most
@@ -89,7 +90,7 @@ def mechanics(problem: Problem) -> Mechanics:
 
     def graph(inputs: list[Node], outputs: list[Node]) -> Graph:
         whole = Graph([*inputs, *system.tau, *system.extra_inputs], {f"{k}": node for k, node in enumerate(outputs)})
-        return problem.bind([str(node.name) for node in inputs], whole)
+        return in_modes(problem, problem.bind([str(node.name) for node in inputs], whole))
 
     state = [*system.q, *system.qd]
     momentum, rate = graph(state, momenta), graph(state, force)
@@ -102,15 +103,17 @@ def mechanics(problem: Problem) -> Mechanics:
 
 def composed_step(composition: Composition, problem: Problem) -> Step:
     """One step, of steps of `verlet` where it is explicit, else of `midpoint`."""
-    explicit = problem.canonical and _separable(problem)
+    explicit = problem.canonical and not problem.slides and _separable(problem)
     return partitioned_step(VERLET if explicit else MIDPOINT, problem, composition)
 
 
 def partitioned_step(method: Partitioned, problem: Problem, composition: Composition = ONCE) -> Step:
     """One step of coordinates and momenta; where there are none, of the state by a method of Gauss's."""
-    if problem.canonical and not problem.momenta:
+    if problem.slides and method.a is not method.b:
+        method = MIDPOINT  # momenta are not free in a slide
+    elif problem.canonical and not problem.momenta and not problem.slides:
         return _of_momenta(method, problem, composition)
-    if not problem.canonical and method.a is not method.b:
+    if not (problem.canonical or problem.slides) and method.a is not method.b:
         raise ValueError(NO_MOMENTA)
     return _of_rates(method, problem, composition)
 

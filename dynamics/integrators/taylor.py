@@ -42,7 +42,7 @@ def taylor_step(problem: Problem, order: int) -> Step:
     # By itself, so that the arrival follows no call that writes coefficients: it would gather them one by one.
     share = replace(call(lambda h, unit: {"s": h / unit}), exact=True)
     at_all = call(lambda unit, h: {"unit": cg.where(unit, unit, h)})  # where nothing is wished
-    controls = ["unit", "last", "before", "next", "end", "rtol", "s", "at_t", "starting"]
+    controls = ["unit", "last", "before", "next", "end", "rtol", "at_t", "starting"]
     return Step(
         dict.fromkeys([*c, "rate"], m) | {"zeros": graphs.zeros},
         [share, _arrival(order)],

@@ -20,11 +20,12 @@ from cgraph import Graph
 from cgraph._shared import Array, kept_by_first, memo
 from cgraph.extend import enclosure
 
-from ..steps.dense_output import Indices, StepBlock
+from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.row_values import values_of
 
 MOST_CELLS = 4096  # that wait at once
 SHORTEST = 2.0**-50  # of a step, a cell
+LEFT = 1e-3  # of the largest that a quantity is in a step, by which it has left zero
 PARTS = 32  # into which a cell is divided again and again to find a root
 BITS = 56.0  # of where in a cell
 DEGREES = 8  # of dense output, whose matrices are kept
@@ -104,12 +105,14 @@ class Cells(NamedTuple):
 def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> tuple[Crossing | None, bool]:
     """The first zero of quantities in these steps, that are positive before; whether cells were too many to be sure.
 
-    fresh: (k,), whether a quantity begins at zero and is on its own side until it has left it.
+    fresh: (k,), of a quantity that begins at zero how far it is rounding; it counts as positive until it has left that
+    in the first step; NaN of the others.
     """
     rows = np.arange(len(block.t))
     low = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))[: len(fresh)]
     which, number = np.nonzero(~(low > 0.0).T)
-    cells = Cells(which, np.zeros(len(which)), np.ones(len(which)), number)
+    begins = np.where(which == 0, _left_at(watched, p, block, fresh)[number], 0.0)
+    cells = Cells(which, begins, np.ones(len(which)), number).take(begins < 1.0)
     best: Crossing | None = None
     while len(cells.rows):
         own = (cells.number, np.arange(len(cells.rows)))
@@ -119,18 +122,16 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
         slopes = outputs_of(watched.slope_bounds, p, *tangents)
         rises, falls = slopes[:k][own] >= 0.0, slopes[k:][own] <= 0.0
         before, after = [_values(watched, p, block, cells.rows, s)[own] for s in (cells.a, cells.b)]
-        begins = fresh[cells.number] & (cells.rows == 0) & (cells.a == 0.0)
         clear = boxes[:k][own] > 0.0
         single = (rises | falls) & np.isfinite(before) & np.isfinite(after)
         last = cells.b - cells.a <= SHORTEST
-        passes = ~clear & (single | last) & ((after < 0.0) | ((before < 0.0) & ~begins)) & ~(begins & rises)
-        passes &= ~(last & ~single & begins)
+        passes = ~clear & (single | last) & ((after < 0.0) | (before < 0.0))
         for each in np.flatnonzero(passes):
             at = (int(cells.rows[each]), float(cells.a[each]))
             if best is not None and at >= best[:2]:
                 continue
             n = int(cells.number[each])
-            s = at[1] if before[each] < 0.0 and not begins[each] else _root(watched, p, block, at[0], at[1], float(cells.b[each]), n)
+            s = at[1] if before[each] < 0.0 else _root(watched, p, block, *at, float(cells.b[each]), n)
             if best is None or (at[0], s) < best[:2]:
                 best = Crossing(at[0], s, n)
         split = ~(clear | single | last)
@@ -143,6 +144,19 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
         if len(cells.rows) > MOST_CELLS:
             return best, False
     return best, True
+
+
+def _left_at(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> Array:
+    """The share of the first step from which each quantity is looked at, (k,); 1 where it stays zero or own all along."""
+    begins = np.where(np.isnan(fresh), 0.0, 1.0)
+    if begins.any():
+        s = np.linspace(0.0, 1.0, PARTS + 1)
+        values = _values(watched, p, block, np.zeros(len(s), dtype=np.intp), s)
+        size = np.abs(values).max(axis=1)
+        for k in np.flatnonzero((begins > 0.0) & (size > fresh)):
+            left = np.flatnonzero(values[k] >= LEFT * size[k])
+            begins[k] = s[left[0]] if len(left) else 1.0 - UNIT if values[k, -1] < 0.0 else 1.0
+    return begins
 
 
 def _values(watched: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:

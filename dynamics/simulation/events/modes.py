@@ -20,6 +20,7 @@ from .crossing_search import Crossing, Quantities, first_crossing, outputs_of, q
 from .event import rounding_errors
 
 AT_ONCE = 1e-11  # of the sizes of the states so far: by so much surfaces may be off that are met at one instant
+SHARE = 1e-9  # of a slide, which is rounding
 FEW = 5  # surfaces at an instant, of which all combinations are tried
 ROUNDS = 50  # of pivots for each of more
 STUCK = 20  # turns at one instant, besides three of each surface
@@ -65,7 +66,7 @@ class Modes:
         self._signs = frozenset(np.flatnonzero(self._switches.signs).tolist())
         self._among = self._signs
         self.sizes = np.zeros(problem.size)
-        self._fresh = np.zeros(len(self.values), dtype=bool)
+        self._fresh = np.full(len(self.values), np.nan)
         self._at = (np.nan, 0)  # the instant of the last turn, and how many there were at it
 
     @property
@@ -98,9 +99,9 @@ class Modes:
     def first_crossing(self, block: StepBlock, p: Sequence[float]) -> tuple[Crossing | None, bool]:
         """Where a surface is crossed in these steps, or a slide ends."""
         watched, turns = self._watched
-        fresh = self._fresh[[k for k, _ in turns]]
+        fresh = np.where(self.slid & ~np.isnan(self._fresh), SHARE, self._fresh)[[k for k, _ in turns]]
         found = first_crossing(watched, np.array([*p, *self.values]), block, fresh)
-        self._fresh[:] = False
+        self._fresh[:] = np.nan
         return found
 
     def turn(self, t: float, x: Array, p: Sequence[float], number: int) -> None:
@@ -142,7 +143,7 @@ class Modes:
         slid, floors = self.slid, self._spacing == 1.0
         upper_end = floors & ~slid & (np.abs(gaps - 1.0) <= allowed)
         zero = (np.abs(gaps - np.where(floors & slid, 0.5, 0.0)) <= allowed) | upper_end | crossed | slid
-        self._fresh = zero.copy()
+        self._fresh = np.where(zero, allowed, np.nan)
         if zero.any():
             among = np.flatnonzero(zero)
             half = 0.5 * self._spacing[among]
