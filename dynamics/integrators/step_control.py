@@ -20,8 +20,8 @@ from cgraph._shared import memo
 from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
 
 from .problem import Problem
-from .switches import Switches
 from .step import Step, Values, call, count, each, numbered, rate_calls, total, with_registers
+from .switches import Switches
 
 RUNNING, DONE, TOO_SMALL, CROSSED = 0.0, 1.0, 2.0, 3.0  # register `status`
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 5.0  # factors from one step to the next

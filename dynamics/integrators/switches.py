@@ -9,7 +9,7 @@ which differs from f_0 in the side of surface j.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import cgraph as cg
@@ -300,7 +300,9 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
     project = _numbered(inputs, onto)
     if problem.projection is not None:
         nodes = list(problem.projection.outputs.values())
-        project = _numbered(inputs, folded(list(project.outputs.values()), build, dict(zip(states, nodes, strict=True))))
+        project = _numbered(
+            inputs, folded(list(project.outputs.values()), build, dict(zip(states, nodes, strict=True)))
+        )
     outputs = dict(zip(problem.rate.outputs, rate, strict=True))
     return replace(problem, rate=Graph(inputs, outputs), projection=project, switches=made, slides=True)
 
@@ -331,7 +333,10 @@ def _solved(matrix: list[list[Node]], rights: list[list[Node]]) -> list[list[Nod
             factor = matrix[i][k] / matrix[k][k]
             if factor.value == 0.0:
                 continue
-            matrix[i] = [*matrix[i][: k + 1], *[a - factor * b for a, b in zip(matrix[i], matrix[k], strict=True)][k + 1 :]]
+            matrix[i] = [
+                *matrix[i][: k + 1],
+                *[a - factor * b for a, b in zip(matrix[i], matrix[k], strict=True)][k + 1 :],
+            ]
             for right in rights:
                 right[i] = right[i] - factor * right[k]
     for right in rights:

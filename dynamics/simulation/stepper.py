@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -25,18 +25,18 @@ from .events.modes import Modes
 from .run_options import Span, Steps
 from .steps.dense_output import StepBlock, inside_nodes, with_hermite
 from .steps.equal_steps import EqualSteps, equal_steps, steps_after
-from .steps.first_step import START, TOLERANCE, instant, start_registers
+from .steps.first_step import START, TOLERANCE, start_registers
 from .steps.flat_position import CREEP, FlatPosition
 from .steps.row_values import values_of
 from .steps.step_program import CompiledSteps, StepProgram, compile_steps, step_program
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 TINY = np.finfo(float).tiny
-CROSSED_BLOCK = 64  # equal steps between two looks for crossings, at most
+CROSSED_BLOCK, LONGEST_BLOCK = 64, 4096  # equal steps between two looks for crossings, at first and at most
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 COUNTED = "steps", "rejected", "evaluations", "jacobians", "factorizations"
-END, GOAL, INSTANT, FIRST = [f"{START}{name}" for name in ("t_end", "goal", "instant", "first")]  # registers
+END, GOAL, FIRST = [f"{START}{name}" for name in ("t_end", "goal", "first")]  # registers
 
 
 class StoppedError(Exception):
@@ -161,21 +161,20 @@ class Stepper(ABC):
         while not self.status:
             crossing: Crossing | None = None
             for block in self._recorded(span, looked):
-                cut = block
+                parts = [block]
                 if self.modes is not None:
-                    cut, crossing = self._crossed(self.with_dense(block))
+                    parts, crossing = self._up_to_crossing(block)
                 if log is not None:
                     log.parameters = self.parameters
-                    cut = log(self.with_dense(cut))
+                    parts = [log(self.with_dense(parts[0]))]
                     crossing = None if log.ended or log.restart else crossing
-                self.steps -= len(block.t) - len(cut.t)
-                if len(cut.t):
-                    yield cut
+                self.steps -= len(block.t) - sum([len(part.t) for part in parts])
+                yield from [part for part in parts if len(part.t)]
                 if crossing is not None or (log is not None and (log.ended or log.restart)):
                     self.status = ""  # of a step beyond
                     break
-            if crossing is not None and cut.t[-1] != span.t_end:
-                self._turn(crossing, cut, span.t_end)
+            if crossing is not None and parts[-1].t[-1] != span.t_end:
+                self._turn(crossing, parts[-1], span.t_end)
                 continue
             if log is None:
                 return
@@ -193,20 +192,31 @@ class Stepper(ABC):
             self._before, self._first = {name: getattr(self, name) for name in COUNTED}, 0.0
             self.begin(x, t, span.t_end)
 
-    def _crossed(self, block: StepBlock) -> tuple[StepBlock, Crossing | None]:
+    def _up_to_crossing(self, block: StepBlock) -> tuple[list[StepBlock], Crossing | None]:
         """The steps up to where the first surface is crossed, and this; or all."""
         assert self.modes is not None
-        crossing, is_sure = self.modes.first_crossing(block, self._given)
-        if not is_sure:
-            text = f"surfaces may be crossed unseen, first after t = {block.t_old[0]:.6g} s: take a shorter max_step or dt"
-            self.warnings += [] if text in self.warnings else [text]
-        if crossing is not None:
-            t, x = (
-                of(np.array([crossing.row]), np.array([crossing.s]))[0] for of in (block.times_at, block.states_at)
-            )
-            block = block.part(slice(crossing.row + 1)).ending(float(t), x)
+        if block.dense is not None or self.log is not None:
+            block = self.with_dense(block)
+            parts: Iterable[StepBlock] = [block]
+        else:  # the cubics through the ends tell where to look
+            cubics = with_hermite(block, self.program.rate, self.parameters, np.empty((0, *block.x.shape)))
+            doubtful = self.modes.doubtful(cubics, self._given)
+            parts = (self.with_dense(block.part(slice(row, row + 1))) for row in doubtful)
+        for part in parts:
+            crossing, is_sure = self.modes.first_crossing(part, self._given)
+            if not is_sure:
+                text = f"surfaces may be crossed unseen, first after t = {part.t_old[0]:.6g} s: take a shorter dt or max_step"
+                self.warnings += [] if text in self.warnings else [text]
+            if crossing is not None:
+                rows, s = np.array([crossing.row]), np.array([crossing.s])
+                last = part.part(slice(crossing.row + 1)).ending(
+                    float(part.times_at(rows, s)[0]), part.states_at(rows, s)[0]
+                )
+                before = block.part(slice(int(np.flatnonzero(block.t_old == last.t_old[0])[0])))
+                self.modes.see(last.x)
+                return [before, last], crossing
         self.modes.see(block.x)
-        return block, crossing
+        return [block], None
 
     def with_dense(self, block: StepBlock) -> StepBlock:
         """The block that has come last, with dense output; that of equal steps is made by shorter steps."""
@@ -335,7 +345,7 @@ class EqualStepper(Stepper):
     def _recorded(self, span: Span, looked: bool) -> Iterator[StepBlock]:
         instants = span.instants if self.control is None else self.control.instants(span.instants)
         m, most, total = self.program.size, self.options.max_steps, 0
-        longest = CROSSED_BLOCK if self.modes is not None else math.inf
+        longest = CROSSED_BLOCK if self.modes is not None else math.inf  # doubled as long as none is crossed
         for stretch in steps_after(self.stretches or equal_steps(instants, self.options.step), self.t):
             self._enter(stretch)
             if self.control is not None:
@@ -346,6 +356,7 @@ class EqualStepper(Stepper):
                     return
                 before, t_old, x_old = self._memory.copy(), self.t, self.x.copy()
                 rows, done = self._rows(int(min(self._left, most - self.steps, longest)), looked)
+                longest = min(2 * longest, LONGEST_BLOCK) if self.modes is not None else math.inf
                 if self._numbers[self._stop]:
                     done -= 1
                     rows = self._undo(before, done, looked)
@@ -399,8 +410,6 @@ class ChosenStepper(Stepper):
         self._t0 = numbers[at["t"]] = t0
         numbers[at[END]] = t_end
         numbers[at[GOAL]] = t_end if self.control is None else self._hold(self.control, t_end)
-        if self.program.timed:
-            numbers[at[INSTANT]] = instant(t0, t_end)
         if self.program.rows is not None:
             self._flat = FlatPosition(self.program, t0, self.x, self.parameters)
 
@@ -535,8 +544,7 @@ def first_registers(program: StepProgram, options: Steps) -> dict[str, ArrayLike
 
 def span_registers(span: Span) -> dict[str, float]:
     """Registers of a span of chosen steps."""
-    ends = {"t_end": span.t_end, "goal": span.t_end, "instant": instant(span.t0, span.t_end)}
-    return {"t": span.t0, **start_registers(ends)}
+    return {"t": span.t0, **start_registers({"t_end": span.t_end, "goal": span.t_end})}
 
 
 def nonfinite(components: Sequence[str], state: Array) -> str:

@@ -20,7 +20,7 @@ from cgraph._shared import Array, LaneCode, kept_by_first, thread_count
 from cgraph.extend import Call, FixedPoint, While, runner
 
 from ...integrators.step_control import DONE
-from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates, runs_beside, unresolved
+from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates, phases, runs_beside
 from ..events.event import EventProgram
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import Span, Steps
@@ -205,7 +205,7 @@ class Task:
             rows = self.count
             if options.estimated:
                 self._beside = runs_beside(self._grids, program.order)
-                self._all_steps = unresolved(program.rate)[0] is not None  # are looked at
+                self._all_steps = phases(program.rate) is not None  # are looked at
                 rows = self._steps + 1 if self._all_steps else rows + len(self._beside.t)
             most = ROWS // (program.steps.width * rows)
             self.largest = 0 if self._all_steps and most < VECTOR else min(LONGEST_CHUNK, max(VECTOR, most))

@@ -2,7 +2,7 @@
 
 With an error that is e = C h^p along the run, x(2h) - x(h) = (2^p - 1) e, and x(4h) - x(2h) is 2^p times as large; how
 much larger it is tells the order that the run has. Of steps that are not all equal, 2^p is the ratio of the sums of
-h^(p + 1). Across a jump or a kink of the rate all may be off alike, and the error is unknown.
+h^(p + 1).
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from cgraph import Graph, Node, floor, less, where
+from cgraph import Graph
 from cgraph._shared import Array, kept_by_first
 
 from ...systems.arguments import TIME
@@ -45,15 +45,6 @@ LOOKS = 1024  # instants at which runs are compared, at most
 UNKNOWN = "the error is unknown"
 TOGETHER = 512  # states that are looked at once
 WAVES = ("sin", "cos", "tan")
-# Of an operation that jumps or has a kink a number that changes only there.
-BRANCHES: dict[str, Callable[..., Node]] = {
-    **dict.fromkeys(
-        ("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal"), lambda node, *args: node
-    ),
-    **dict.fromkeys(("minimum", "maximum"), lambda node, a, b: less(a, b)),
-    "abs": lambda node, a: less(a, 0.0),
-    "fmod": lambda node, a, b: where(less(a / b, 0.0), -floor(-(a / b)), floor(a / b)),
-}
 
 
 class RunsBeside(NamedTuple):
@@ -85,25 +76,22 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
 
 
 @kept_by_first
-def unresolved(rate: Graph) -> tuple[Graph | None, int]:
-    """Phases of waves in time, then branches, over the inputs of a rate; None if it has neither. How many phases."""
+def phases(rate: Graph) -> Graph | None:
+    """Phases of waves in time, over the inputs of a rate; None if it has none."""
     timed = {node for node in rate.inputs if node.name == TIME}
     for node in rate.nodes:
         if not timed.isdisjoint(node.args):
             timed |= {node}
-    waves = dict.fromkeys(node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed)
-    branches = [BRANCHES[node.op.name](node, *node.args) for node in rate.nodes if node.op.name in BRANCHES]
-    found = [*waves, *branches]
-    return (Graph(rate.inputs, {f"y{k}": node for k, node in enumerate(found)}) if found else None), len(waves)
+    found = dict.fromkeys(node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed)
+    return Graph(rate.inputs, {f"y{k}": node for k, node in enumerate(found)}) if found else None
 
 
 class Watch:
-    """What steps of k runs side by side, from x (k, m) at t with parameters p (k, ..), do not resolve."""
+    """How fast the waves in time turn along k runs side by side, from x (k, m) at t with parameters p (k, ..)."""
 
     def __init__(self, rate: Graph, p: Array, t: float, x: Array) -> None:
-        self._graph, self._waves = unresolved(rate)
+        self._graph = phases(rate)
         self.turning = np.zeros(len(x))  # of the fastest sines and cosines [rad/s]
-        self.bent = np.full(len(x), np.nan)  # start of the first step that passes a jump or a kink [s]
         self._p, self._seen = p, [(np.array([t]), x[:, None])]
 
     def see(self, t: Array, x: Array) -> None:
@@ -120,12 +108,8 @@ class Watch:
         t, x = np.concatenate([t for t, _ in self._seen]), np.concatenate([x for _, x in self._seen], axis=1)
         self._seen = [(t[-1:], x[:, -1:])]
         columns = [*np.moveaxis(x, -1, 0), t, *np.moveaxis(self._p[:, None], -1, 0)]
-        change = np.abs(np.diff(values_of(self._graph, columns, *x.shape[:-1])))
-        speeds = change[: self._waves] / np.abs(np.diff(t))
+        speeds = np.abs(np.diff(values_of(self._graph, columns, *x.shape[:-1]))) / np.abs(np.diff(t))
         self.turning = np.maximum(self.turning, speeds.max(axis=(0, 2), initial=0.0))
-        passes = (change[self._waves :] != 0.0).any(axis=0)
-        first = np.where(passes.any(axis=1), t[passes.argmax(axis=1)], np.nan)
-        self.bent = np.where(np.isnan(self.bent), first, self.bent)
 
 
 def error_estimates(
@@ -151,7 +135,7 @@ def error_estimates(
     largest, last = [np.maximum(UNIT * math.sqrt(steps), _errors(each, measured, beside)) for each in shares]
     largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
     resolved = math.pi * max(1.0, 0.5 * program.order) / beside.longest  # rad/s: two evaluations in a turn
-    unknown = (watch.turning > resolved) | ~np.isnan(since) | ~np.isnan(watch.bent)
+    unknown = (watch.turning > resolved) | ~np.isnan(since)
     largest[unknown] = last[unknown] = math.inf
     allowed = options.absolute + options.relative * scale
     for k in np.flatnonzero(~(largest * scale <= allowed).all(axis=1)).tolist():
@@ -160,9 +144,6 @@ def error_estimates(
         if watch.turning[k] > resolved:
             said = f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
             said += f"{beside.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
-        elif not math.isnan(watch.bent[k]):
-            said = f"{UNKNOWN} from t = {watch.bent[k]:.6g} s on: the rate has a jump or a kink there"
-            how = ": take method='dop853', which finds its way across"
         elif not math.isnan(since[k]):
             said = f"{UNKNOWN}: beside it a run of other steps stops at t = {since[k]:.6g} s"
         else:

@@ -84,7 +84,9 @@ def _function(graph: Graph) -> Callable[[Array], Array]:
 def outputs_of(graph: Graph, *parts: Any) -> Array:
     """Outputs (k, N) of a graph at inputs that go along the last axis, or are the same at all points."""
     width = max([np.shape(part)[-1] for part in parts if np.ndim(part) == 2])
-    rows = [np.broadcast_to(np.reshape(part, (-1, 1)) if np.ndim(part) < 2 else part, (len(part), width)) for part in parts]
+    rows = [
+        np.broadcast_to(np.reshape(part, (-1, 1)) if np.ndim(part) < 2 else part, (len(part), width)) for part in parts
+    ]
     with np.errstate(all="ignore"):
         return np.asarray(_function(graph)(np.concatenate(rows)))
 
@@ -100,6 +102,13 @@ class Cells(NamedTuple):
     def take(self, which: Any) -> Cells:
         """Subset of the cells."""
         return Cells._make([array[which] for array in self])
+
+
+def steps_near_zero(watched: Quantities, p: Array, block: StepBlock) -> list[int]:
+    """Steps in which quantities may not be positive."""
+    rows = np.arange(len(block.t))
+    bounds = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))
+    return list(np.flatnonzero(~(bounds[: len(bounds) // 2] > 0.0).all(axis=0)).tolist())
 
 
 def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> tuple[Crossing | None, bool]:
@@ -123,7 +132,7 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
         rises, falls = slopes[:k][own] >= 0.0, slopes[k:][own] <= 0.0
         before, after = [_values(watched, p, block, cells.rows, s)[own] for s in (cells.a, cells.b)]
         clear = boxes[:k][own] > 0.0
-        single = (rises | falls) & np.isfinite(before) & np.isfinite(after)
+        single = (rises | falls) & np.isfinite(boxes[k:][own] - boxes[:k][own])  # a pole is no zero
         last = cells.b - cells.a <= SHORTEST
         passes = ~clear & (single | last) & ((after < 0.0) | (before < 0.0))
         for each in np.flatnonzero(passes):
@@ -144,6 +153,18 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
         if len(cells.rows) > MOST_CELLS:
             return best, False
     return best, True
+
+
+def told_by_bounds(
+    watched: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
+) -> tuple[Array, Array, Array]:
+    """Of one quantity and cells, (n,), whether it is clear of zero, goes one way, and is bounded."""
+    cells = Cells(rows, a, b, np.zeros_like(rows))
+    low, high = outputs_of(watched.bounds, p, *_hulls(block, rows, a, b))
+    down, up = outputs_of(watched.slope_bounds, p, *_tangents(block, cells))
+    clear = (low > 0.0) | (high < 0.0)
+    is_bounded = np.isfinite(high - low)
+    return clear, is_bounded & ((down >= 0.0) | (up <= 0.0)), is_bounded
 
 
 def _left_at(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> Array:

@@ -16,15 +16,11 @@ from ...integrators.step_control import RESOLUTION
 from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags
+from .crossing_search import quantities, told_by_bounds
 from .event import EventProgram, WatchedEvent, numbers_of
 
-CELLS = 8  # of a step before the first split, so that it is looked at sixteen times at least
-NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(CELLS + 1) / CELLS)  # not evenly spaced: no oscillation hides between them
-MOST_CELLS = 1024  # cells of a step
-COARSER = 8.0  # than a neighbor a cell may not be: it would agree by chance
+MOST_CELLS = 1024  # of a step
 SHORTEST = 2.0**-48  # of a step, a cell
-DECAY = 16.0  # of what a cubic misses, from a cell to its halves
-MARGIN = 12.0  # by which a cubic has to tell more than it misses
 PARTS, TOGETHER = 32, 8192  # into which a cell is divided again and again, and those of all cells together
 WHILE = 2.0**-20  # of a step
 SMALL = 2.0**-10  # of what a quantity is in a cell: an end that is less may be zero to rounding
@@ -100,8 +96,8 @@ class Cells(NamedTuple):
     g_b: Array
     slope_a: Array
     slope_b: Array
-    miss: Array  # an estimate of how far the cubic through both ends is off
-    rounding: Array
+    clear: Flags  # whether the quantity cannot be zero there
+    broken: Flags  # whether it has no bounds, as at a pole
 
     def take(self, which: Flags | Indices) -> Cells:
         """Subset of the cells."""
@@ -112,79 +108,44 @@ class Cells(NamedTuple):
         cells = Cells._make([np.concatenate(parts) for parts in zip(self.take(~split), *halves, strict=True)])
         return cells.take(np.lexsort((cells.a, cells.rows)))
 
-    def beside(self, extreme: Callable[[Array, Array], Array], values: Array) -> Array:
-        """Smallest or largest of a cell's value and its neighbors'."""
-        result = values.copy()
-        left = np.flatnonzero((self.rows[:-1] == self.rows[1:]) & (self.b[:-1] == self.a[1:]))
-        result[left] = extreme(result[left], values[left + 1])
-        result[left + 1] = extreme(result[left + 1], values[left])
-        return result
-
-    def control_points(self) -> Array:
-        """Control points, (4, k), of the cubics through values and slopes at the ends, which their hull contains."""
-        third = (self.b - self.a) / 3.0
-        return np.stack([self.g_a, self.g_a + self.slope_a * third, self.g_b - self.slope_b * third, self.g_b])
-
-    def clear(self) -> Flags:
-        """Whether the quantity cannot be zero there, (k,)."""
-        # It stays in the hull of the control points, and where it turns, as |x| may do at once, also on this side of
-        # the point where the tangents at the ends meet.
-        points, sign = self.control_points(), np.sign(self.g_a)
-        hull = (points * sign > MARGIN * self.miss).all(axis=0)
-        turns = (self.slope_a * sign < 0.0) & (self.slope_b * sign > 0.0)
-        bend = np.where(turns, self.slope_b - self.slope_a, 1.0)
-        meet = self.g_a + self.slope_a * (self.slope_b * (self.b - self.a) - (self.g_b - self.g_a)) / bend
-        clear: Flags = hull & ~(turns & (meet * sign <= MARGIN * self.miss))
-        return clear
-
-    def resolved(self) -> Flags:
-        """Whether the ends tell how often it is zero, (k,): not, everywhere, or nothing can be told of what is NaN."""
-        points, margin = self.control_points(), MARGIN * self.miss
-        zero, none = np.abs(points).max(axis=0) <= 2.0 * self.rounding, ~np.isfinite(points).all(axis=0)
-        told: Flags = self.clear() | zero | none
-        for order in (1, 2):  # or it is monotone, or its slope is, so that it has one extremum
-            differences = np.diff(points, order, axis=0)
-            told |= (differences > margin).all(axis=0) | (differences < -margin).all(axis=0)
-        return told
-
 
 def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
-    """The cells of all steps in order, and for which steps, (steps,), `MOST_CELLS` were too few."""
-    count = len(steps.block.t)
-    rows, s = np.arange(count), np.tile(NODES, (count, 1))
-    ends = [(each[:, :-1].ravel(), each[:, 1:].ravel()) for each in (s, steps.values(rows, s), steps.slopes(rows, s))]
-    none = np.zeros(CELLS * count)
-    cells = Cells._make([np.repeat(rows, CELLS), *[end for pair in ends for end in pair], none, none])
-    cells = cells.replaced(none == 0.0, *_halves(steps, cells, bounded=False))
-    worst = cells.miss.reshape(count, 2 * CELLS).max(axis=1)
-    cells = cells._replace(miss=np.maximum(cells.miss, worst[cells.rows] / DECAY))
-    beyond = np.zeros(count, dtype=bool)
+    """Cells of all steps in order, in which a quantity is not zero or goes one way, but for rounding; and for which
+    steps, (steps,), `MOST_CELLS` were too few.
+    """
+    count, watched, p = len(steps.block.t), quantities(steps.event.values, steps.block.x.shape[1]), steps.parameters
+    rows = np.arange(count)
+    ends = [of(rows, s) for of in (steps.values, steps.slopes) for s in (np.zeros(count), np.ones(count))]
+    cells = Cells(
+        rows, np.zeros(count), np.ones(count), *ends, np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    )
+    done, beyond, new = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
     while True:
-        width = cells.b - cells.a
-        unresolved = ~cells.resolved() & (width > SHORTEST)
-        split = unresolved | (cells.beside(np.minimum, width) * COARSER < width)
-        size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[split], minlength=count)
-        late = (size > MOST_CELLS)[cells.rows]
-        beyond[cells.rows[unresolved & late]] = True
-        split &= ~late
+        fresh = cells.take(new)
+        clear, goes_one_way, bounded = told_by_bounds(watched, np.array(p), steps.block, fresh.rows, fresh.a, fresh.b)
+        size = np.maximum(np.abs(fresh.g_a), np.abs(fresh.g_b))
+        told = clear | goes_one_way | (bounded & (size <= 2.0 * steps.rounding(fresh.rows, fresh.b)))
+        nothing = np.isnan(fresh.g_a) & np.isnan(fresh.g_b)
+        done[new] = told | nothing | (fresh.b - fresh.a <= SHORTEST)
+        cells.clear[new], cells.broken[new] = clear, ~bounded
+        size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[~done], minlength=count)
+        late = (size > MOST_CELLS)[cells.rows] & ~done
+        beyond[cells.rows[late]] = True
+        split = ~done & ~late
         if not split.any():
             return cells, beyond
-        cells = cells.replaced(split, *_halves(steps, cells.take(split), bounded=True))
-
-
-def _halves(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> tuple[Cells, Cells]:
-    """Halves of cells; how far their cubics miss is told by value and slope in the middle. bounded: with rounding."""
-    width = cells.b - cells.a
-    middle = cells.a + 0.5 * width
-    g, slope = steps.values(cells.rows, middle), steps.slopes(cells.rows, middle)
-    g_off = g - 0.5 * (cells.g_a + cells.g_b) - 0.125 * width * (cells.slope_a - cells.slope_b)
-    slope_off = width * (slope + 0.25 * (cells.slope_a + cells.slope_b)) - 1.5 * (cells.g_b - cells.g_a)
-    off = np.maximum(np.abs(g_off), 0.25 * np.abs(slope_off))
-    wide = 4.0 * cells.beside(np.maximum, cells.beside(np.maximum, off))  # one that is far off may agree by chance
-    miss = np.maximum(wide, cells.miss) / DECAY
-    rounding = steps.rounding(cells.rows, middle) if bounded else cells.rounding
-    halves = cells._replace(miss=miss, rounding=rounding)
-    return halves._replace(b=middle, g_b=g, slope_b=slope), halves._replace(a=middle, g_a=g, slope_a=slope)
+        few = cells.take(split)
+        middle = few.a + 0.5 * (few.b - few.a)
+        g, slope = steps.values(few.rows, middle), steps.slopes(few.rows, middle)
+        halves = few._replace(b=middle, g_b=g, slope_b=slope), few._replace(a=middle, g_a=g, slope_a=slope)
+        marks = np.concatenate([np.zeros(int((~split).sum()), dtype=bool), np.ones(2 * len(middle), dtype=bool)])
+        order = (
+            np.concatenate([cells.rows[~split], few.rows, few.rows]),
+            np.concatenate([cells.a[~split], few.a, middle]),
+        )
+        sorting = np.lexsort((order[1], order[0]))
+        done = np.concatenate([(done | late)[~split], np.zeros(2 * len(middle), dtype=bool)])[sorting]
+        new, cells = marks[sorting], cells.replaced(split, *halves)
 
 
 def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
@@ -205,7 +166,8 @@ def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
     signs = np.nan_to_num(np.sign(np.append(side.sign, g)))
     zero = g == 0.0
     zero[0] |= side.leaving or side.resting
-    beside = np.concatenate([np.flatnonzero(signs[:-1] * signs[1:] < 0.0), extrema])
+    broken = np.append(False, cells.broken)  # before each look
+    beside = np.concatenate([np.flatnonzero((signs[:-1] * signs[1:] < 0.0) & ~broken), extrema])
     _add_rounded_zeros(zero, beside, lambda looks: np.abs(g[looks]) <= steps.rounding(rows[looks], s[looks]))
     signs[1:][zero] = 0.0
     if side.leaving:
@@ -241,7 +203,7 @@ def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
         side.sign = 0.0
     side.waiting = bool(zero[-1]) and side.sign != 0.0
     # an arrival is at the next look, if that is zero or the first, or within the cell before it
-    looks = np.array(arrivals, dtype=np.intp)
+    looks = np.array([i for i in arrivals if i == len(g) or not broken[i]], dtype=np.intp)
     inside = (looks > 0) & ~zero[np.minimum(looks, len(g) - 1)]
     places, few, sign = s[looks], cells.take(looks[inside] - 1), signs[looks]
     places[inside] = _turn(lambda s: steps.values(few.rows, s) * sign[inside, None] > 0.0, few.a, few.b)[1]
@@ -253,10 +215,12 @@ def _at_extrema(steps: WatchedSteps, cells: Cells) -> tuple[Cells, Indices]:
     """The cells, parted at extrema where a quantity may come to zero and turn back; and the looks there."""
     turns = (cells.slope_a != 0.0) & (cells.slope_a * cells.slope_b <= 0.0)
     few = cells.take(turns)
-    ends, points = np.stack([few.g_a, few.g_b]), few.control_points()
+    ends = np.stack([few.g_a, few.g_b])
     toward = (ends * np.sign(few.slope_a) < 0.0).all(axis=0)
-    at_zero = np.abs(ends).min(axis=0) <= SMALL * np.abs(points).max(axis=0)
-    turns[turns] = (toward | at_zero) & ~few.clear()
+    third = (few.b - few.a) / 3.0
+    points = np.abs(np.stack([*ends, few.g_a + few.slope_a * third, few.g_b - few.slope_b * third]))
+    at_zero = np.abs(ends).min(axis=0) <= SMALL * points.max(axis=0)
+    turns[turns] = (toward | at_zero) & ~few.clear
     few = cells.take(turns)
     if not len(few.a):
         return cells, np.zeros(0, dtype=np.intp)

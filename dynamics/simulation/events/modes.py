@@ -16,7 +16,7 @@ from cgraph.extend import Builder, tangents
 from ...integrators import Problem
 from ...integrators.switches import Switches, sliding
 from ..steps.dense_output import UNIT, StepBlock
-from .crossing_search import Crossing, Quantities, first_crossing, outputs_of, quantities
+from .crossing_search import Crossing, Quantities, first_crossing, outputs_of, quantities, steps_near_zero
 from .event import rounding_errors
 
 AT_ONCE = 1e-11  # of the sizes of the states so far: by so much surfaces may be off that are met at one instant
@@ -104,6 +104,10 @@ class Modes:
         self._fresh[:] = np.nan
         return found
 
+    def doubtful(self, block: StepBlock, p: Sequence[float]) -> list[int]:
+        """Steps in which a surface may be crossed."""
+        return steps_near_zero(self._watched[0], np.array([*p, *self.values]), block)
+
     def turn(self, t: float, x: Array, p: Sequence[float], number: int) -> None:
         """Turn the mode of a margin that is zero at this state, and what else is due there."""
         k, way = self._watched[1][number]
@@ -147,7 +151,11 @@ class Modes:
         if zero.any():
             among = np.flatnonzero(zero)
             half = 0.5 * self._spacing[among]
-            middle = np.where(slid[among], self.values[among], self.values[among] - half * np.where(floors[among], 1.0, self.values[among]))
+            middle = np.where(
+                slid[among],
+                self.values[among],
+                self.values[among] - half * np.where(floors[among], 1.0, self.values[among]),
+            )
             middle = np.where(upper_end[among], self.values[among] + half, middle)
             # a floor that has turned down is at the upper end of its side
             down = floors[among] & crossed[among] & (gaps[among] > 0.5)
@@ -175,7 +183,15 @@ class _Choice:
     """The choice of sides of surfaces `among` all, (n,), each at middle -+ half, or sliding at middle."""
 
     def __init__(
-        self, of: Modes, t: float, x: Array, p: Sequence[float], among: Array, middle: Array, half: Array, crossed: Array
+        self,
+        of: Modes,
+        t: float,
+        x: Array,
+        p: Sequence[float],
+        among: Array,
+        middle: Array,
+        half: Array,
+        crossed: Array,
     ) -> None:
         self._of, self._t, self._x, self._p = of, t, x, p
         self._among, self._middle, self._half, self._crossed = among, middle, half, crossed

@@ -214,7 +214,11 @@ def gradient_many(
     if motions.each_step and TORQUE in gradients:
         gradients[TORQUE] = np.full((count, *motions.tau.shape[:-1]), np.nan)
     # one by one, or side by side, of which a last one goes with those before it
-    alone = settings.adaptive or bool(motions.equations.modes) or (count < FEW_MOTIONS and settings.integrator.step(problem).iterates)
+    alone = (
+        settings.adaptive
+        or bool(motions.equations.modes)
+        or (count < FEW_MOTIONS and settings.integrator.step(problem).iterates)
+    )
     begins = [*(range(count) if alone else range(0, max(1, count - 1), WIDE_BLOCK)), count]
     early, said, parts = dict[int, str](), dict[int, str](), [range(*ends) for ends in itertools.pairwise(begins)]
     for part in parts:

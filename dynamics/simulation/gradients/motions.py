@@ -223,7 +223,9 @@ class Motions:
             at = [each for each, when in happened if when == whole[-1] and (each.reset if resets else each.terminal)]
             if (resets or run.event) and len(at) != 1:
                 names = ", ".join([each.name for each in at])
-                raise ValueError(f"events {names} happen at one instant, t = {whole[-1]:.6g} s, which has no derivative")
+                raise ValueError(
+                    f"events {names} happen at one instant, t = {whole[-1]:.6g} s, which has no derivative"
+                )
             inside = [] if run.modes is None else np.flatnonzero(np.isin(whole, [turn.t for turn in turns]))
             ends = [*[k for k in inside if 0 < k < len(whole) - 1], len(whole) - 1]
             for k, (first, last) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):

@@ -25,8 +25,8 @@ from ...integrators.step_control import COLLAPSE, RESOLUTION, SMALLEST_ATOL, reg
 from .state_sizes import OTHERS, StateKinds
 
 START = "start."  # before the names of its own registers, so that no method has to keep clear of them
-# Those that a run writes: its end, where its steps end first, rtol, limit, first step or 0, what moves the time.
-GIVEN = "t_end goal relative longest_step first instant begins".split()
+# Those that a run writes: its end, where its steps end first, rtol, limit, first step or 0.
+GIVEN = "t_end goal relative longest_step first begins".split()
 TOLERANCE = f"{START}tolerance"  # the register of atol
 LEAP = 1e-2  # of the whole run: the first step that is tried
 TRIALS = 60.0  # of a first step
@@ -35,7 +35,6 @@ HUGE = 1e300  # a tolerance that anything meets
 ROUNDS = 4.0  # of a first step, by which the sizes of the states are known
 HALVINGS = 100.0  # of a look ahead
 JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
-SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it by more
 FIRST_LOOK = 32.0  # trials, after which atol is raised to the sizes so far; then after twice as many
 AT_ONCE = 1.0  # the same where no look ahead has found sizes
 STILL = 2.0**-54  # of a coordinate, a quarter of its last digit: a step that moves it by less does not move it
@@ -45,11 +44,6 @@ WHOLE, FIRST_HALF, SECOND_HALF = 3.0, 2.0, 1.0  # register `search`
 def start_registers(values: Mapping[str, Any]) -> dict[str, Any]:
     """Registers with which a run begins, besides x, t, p and sized: `GIVEN` and tolerance, its atol."""
     return {f"{START}{name}": value for name, value in {**values, "begins": 1.0}.items()} | {"anew": 1.0}
-
-
-def instant(t0: float, t_end: float) -> float:
-    """The time after which a force that jumps at the start has jumped [s]."""
-    return max(math.ulp(t0), COLLAPSE * abs(t_end - t0))
 
 
 def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: int, *, starts: bool) -> Program:
@@ -140,25 +134,8 @@ def begin(t: Node, t_end: Node, first: Node, longest_step: Node) -> Values:
         "h_first": h_first,
         "h_look": cg.where(first, first, h_first),
         "look": 1.0,
-        **dict.fromkeys("rounds begins jumps reach".split(), 0.0),
+        **dict.fromkeys("rounds begins reach".split(), 0.0),
     }
-
-
-def _jump(problem: Problem, kinds: StateKinds) -> list[Statement]:
-    """The rate to look ahead by: of a force that jumps at the start, and no more in the next instant, that after it."""
-
-    def jumps(rate_start: Node, rate_ahead: Node, rate_before: Node, kind: Node, kind_ahead: Node) -> Values:
-        least = SUDDEN * cg.maximum(kind, kind_ahead)
-        return {"jumps": (abs(rate_ahead - rate_start) > least) * (abs(rate_before - rate_ahead) <= least)}
-
-    body: list[Statement] = [copied("rate_start", "rate_look")]
-    if not problem.timed:
-        return body
-    for k, target in ((1.0, "rate_ahead"), (2.0, "rate_before")):
-        ahead = call(lambda t, to, dt, k=k: {"t_ahead": t + to * (k * dt)}, "t0", "toward", "instant")
-        body += [ahead, _rate(problem, "x_start", "t_ahead", target)]
-    body += [Call(kinds.largest, ("rate_start",), ("kind",)), Call(kinds.largest, ("rate_ahead",), ("kind_ahead",))]
-    return [*body, total(jumps), If("jumps", (copied("rate_ahead", "rate_look"),))]
 
 
 def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -> tuple[Statement, ...]:
@@ -169,13 +146,12 @@ def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -
 
     euler = (
         copied("x_start", "x_ahead"),
-        copied("rate_look", "rate_ahead"),
+        copied("rate_start", "rate_ahead"),
         each(lambda x_start: {"size_ahead": _size(x_start)}),
         call(lambda: {"going": 1.0, **dict.fromkeys("turn moving moving1 moving2".split(), 0.0)}),
         While("going", _euler(problem, kinds)),
     )
     return (
-        *_jump(problem, kinds),
         Call(kinds.largest, ("x_start",), ("kind",)),
         call(lambda h_look: {"reach": h_look, "left": HALVINGS}),
         While("left", (*euler, call(shorter))),
@@ -185,15 +161,15 @@ def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -
 
 
 @call
-def searched(sized: Node, jumps: Node, first: Node, reach: Node, h_first: Node, least: Node) -> Values:
-    """Whether to search or to set out. Halving steps only leads to a jump; step control passes it, as any later one."""
-    h_try, jumps = cg.maximum(h_first, least), sized * jumps
+def searched(sized: Node, first: Node, reach: Node, h_first: Node, least: Node) -> Values:
+    """Whether to search or to set out."""
+    h_try = cg.maximum(h_first, least)
     return {
         "look": 0.0,
         "tested": 0.0,
-        "search": cg.where(cg.maximum(first, jumps), 0.0, WHOLE),
+        "search": cg.where(first, 0.0, WHOLE),
         "h_try": h_try,
-        "h_next": cg.where(first, first, cg.where(jumps, reach, h_try)),
+        "h_next": cg.where(first, first, h_try),
         "longest_next": cg.where(sized, cg.maximum(first, reach), 0.0),
     }
 
