@@ -263,13 +263,21 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         for side in (lower, *[lower | {modes[k]: lower[modes[k]] + switches.spacing[k]} for k in chosen])
     ]
     f, g = first[:m], first[m:]
-    time = {inputs[m]: cg.constant(1.0)}
+    ways = dict(zip(states, f, strict=True)) | {inputs[m]: cg.constant(1.0)}
     with building(build):
         # g of the upper end of a floor's lower side
         g = [gap - hold if switches.spacing[k] == 1.0 else gap for k, hold, gap in zip(chosen, holds, g, strict=True)]
         jumps = [[there - here for there, here in zip(other[:m], f, strict=True)] for other in others]
-    drift = _along(g, dict(zip(states, f, strict=True)) | time, build)
-    columns_of = [_along(g, dict(zip(states, jump, strict=True)), build) for jump in jumps]
+    drift, columns_of = (
+        _along(g, ways, build),
+        [_along(g, dict(zip(states, jump, strict=True)), build) for jump in jumps],
+    )
+    # a jump that does not move its g itself, as that of an acceleration by a position, moves the rate of g
+    late = [k for k, column in enumerate(columns_of) if column[k].value == 0.0]
+    if late:
+        g = [drift[k] if k in late else gap for k, gap in enumerate(g)]
+        drift = _along(g, ways, build)
+        columns_of = [_along(g, dict(zip(states, jump, strict=True)), build) for jump in jumps]
     with building(build):
         matrix = [
             [cg.where(holds[i] * holds[j], column[i], 1.0 if i == j else 0.0) for j, column in enumerate(columns_of)]

@@ -88,6 +88,7 @@ class Stepper(ABC):
         self._before = dict.fromkeys(COUNTED, 0)  # the last reset
         self._first = 0.0
         self.largest, self.warnings, self._is_stiff, self._is_told = 0.0, list[str](), False, False
+        self._is_unsure = False
         self.status = self.event = ""
         self.log = None if self.events is None else EventLog(self.events)
 
@@ -204,9 +205,9 @@ class Stepper(ABC):
             parts = (self.with_dense(block.part(slice(row, row + 1))) for row in doubtful)
         for part in parts:
             crossing, is_sure = self.modes.first_crossing(part, self._given)
-            if not is_sure:
-                text = f"surfaces may be crossed unseen, first after t = {part.t_old[0]:.6g} s: take a shorter dt or max_step"
-                self.warnings += [] if text in self.warnings else [text]
+            if not (is_sure or self._is_unsure):
+                self._is_unsure, first = True, f"surfaces may be crossed unseen, first after t = {part.t_old[0]:.6g} s"
+                self.warnings.append(f"{first}: take a shorter dt or max_step")
             if crossing is not None:
                 rows, s = np.array([crossing.row]), np.array([crossing.s])
                 last = part.part(slice(crossing.row + 1)).ending(
@@ -214,7 +215,7 @@ class Stepper(ABC):
                 )
                 before = block.part(slice(int(np.flatnonzero(block.t_old == last.t_old[0])[0])))
                 self.modes.see(last.x)
-                return [before, last], crossing
+                return [each for each in (before, last) if len(each.t)], crossing
         self.modes.see(block.x)
         return [block], None
 

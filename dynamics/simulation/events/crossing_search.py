@@ -168,7 +168,7 @@ def told_by_bounds(
 
 
 def _left_at(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> Array:
-    """The share of the first step from which each quantity is looked at, (k,); 1 where it stays zero or own all along."""
+    """The share of the first step from which each quantity is looked at, (k,); 1 where it stays on its side."""
     begins = np.where(np.isnan(fresh), 0.0, 1.0)
     if begins.any():
         s = np.linspace(0.0, 1.0, PARTS + 1)

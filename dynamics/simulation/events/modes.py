@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from .crossing_search import Crossing, Quantities, first_crossing, outputs_of, q
 from .event import rounding_errors
 
 AT_ONCE = 1e-11  # of the sizes of the states so far: by so much surfaces may be off that are met at one instant
-SHARE = 1e-9  # of a slide, which is rounding
+SHARE = RESTS = 1e-9  # of a slide, and of a second derivative, which is rounding
 FEW = 5  # surfaces at an instant, of which all combinations are tried
 ROUNDS = 50  # of pivots for each of more
 STUCK = 20  # turns at one instant, besides three of each surface
@@ -31,9 +32,12 @@ class Turn(NamedTuple):
 
     t: float
     modes: tuple[float, ...]
-    among: frozenset[int]  # surfaces of which some are slid on, if any is
-    slid: bool
+    slides: frozenset[int] | None  # surfaces of which some are slid on, if any is
     number: int  # of the margin that was zero there; -1 at a start
+
+    def of(self, problem: Problem) -> Problem:
+        """The problem that holds from here on."""
+        return problem if self.slides is None else sliding(problem, self.slides)
 
 
 @kept_by_first
@@ -72,13 +76,16 @@ class Modes:
     @property
     def slid(self) -> Array:
         """Whether the motion slides on each surface."""
-        halves = (self.values - 1.0) / self._spacing
+        return self._slid(self.values)
+
+    def _slid(self, modes: Sequence[float] | Array) -> Array:
+        halves = (np.array(modes) - 1.0) / self._spacing
         return np.asarray(halves != np.floor(halves))
 
     @property
     def problem(self) -> Problem:
         """The problem by which the motion goes on."""
-        return sliding(self.plain, self._among) if self.slid.any() else self.plain
+        return self.problem_in(self.values.tolist())
 
     def see(self, x: Array) -> None:
         """States (.., m) that the motion has come to."""
@@ -168,15 +175,33 @@ class Modes:
             self.values[among] = found
             slid = self.slid
             self._among = self._among | frozenset(np.flatnonzero(slid).tolist())
-        self.turns.append(Turn(t, tuple(self.values.tolist()), self._among, bool(slid.any()), number))
+        self.turns.append(Turn(t, tuple(self.values.tolist()), self._among if slid.any() else None, number))
 
-    def arrival(self, before: Turn, turn: Turn) -> Graph:
-        """The margin that is zero where modes turn."""
-        problem = sliding(self.plain, before.among) if before.slid else self.plain
-        switches = problem.switches
+    def problem_in(self, modes: Sequence[float]) -> Problem:
+        """The problem that holds in some modes."""
+        return sliding(self.plain, self._among) if self._slid(modes).any() else self.plain
+
+    def margin(self, turn: Turn, number: int) -> Graph:
+        """One of the margins of the problem that holds from a turn on."""
+        switches = turn.of(self.plain).switches
         assert switches is not None
-        margin = list(switches.margins.outputs.values())[turn.number]
-        return Graph(switches.margins.inputs, {"margin": margin})
+        return Graph(switches.margins.inputs, {"margin": list(switches.margins.outputs.values())[number]})
+
+    def crossed(self, before: Turn, after: Turn) -> list[tuple[int, int]]:
+        """The modes that change between two turns, and the margins that are zero there, that which was found first."""
+        switches = before.of(self.plain).switches
+        assert switches is not None
+        found = [(switches.turns[after.number][0], after.number)]
+        for k, (one, two) in enumerate(zip(before.modes, after.modes, strict=True)):
+            if one != two and k != found[0][0]:
+                ways = [n for n, (j, way) in enumerate(switches.turns) if j == k and way * (two - one) >= 0.0]
+                found.append((k, ways[0]))
+        return found
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The surfaces as formulas."""
+        return self._switches.words
 
 
 class _Choice:
@@ -219,56 +244,70 @@ class _Choice:
     def _modes(self, sides: Sequence[int]) -> Array:
         return np.asarray(self._middle + self._half * np.array(sides))
 
+    def _modes_at(self, sides: Sequence[int]) -> Array:
+        modes = self._of.values.copy()
+        modes[self._among] = self._modes(sides)
+        return modes
+
     def _drifts(self, sides: Sequence[int]) -> tuple[Array, Array]:
-        """How the gaps move with these sides, none of which is 0, and what of it is rounding, (n,) each."""
+        """How the gaps move with these sides, none of which is 0, and what of it is rounding, (n,) each.
+
+        Gaps that rest with any sides, as of a position at rest, by their second derivatives.
+        """
         key = tuple(sides)
         if key not in self._known:
-            modes = self._of.values.copy()
-            modes[self._among] = self._modes(sides)
             ways = np.array([[0.0] * len(self._x), *_signs(len(self._x))]).T
             states = self._x[:, None] + AT_ONCE * self._of.sizes[:, None] * ways
-            fixed = np.concatenate([[self._t], self._p, modes])[:, None]
+            fixed = np.concatenate([[self._t], self._p, self._modes_at(sides)])[:, None]
             points = np.concatenate([states, np.broadcast_to(fixed, (len(fixed), ways.shape[1]))])
             values = outputs_of(_drift(self._of.plain, 1), points)[self._among]
             off = 4.0 * np.abs(values[:, 1:] - values[:, :1]).max(axis=1) + 16.0 * UNIT * np.abs(values[:, 0])
             self._known[key] = values[:, 0], off
         return self._known[key]
 
+    @cached_property
+    def _rests(self) -> Array:
+        """Whether each gap rests on both sides of all surfaces."""
+        n = len(self._among)
+        found = [self._drifts([side] * n) for side in (-1, 1)]
+        return np.logical_and(*[np.abs(drift) <= off for drift, off in found])
+
+    def _motions(self, sides: Sequence[int]) -> tuple[Array, Array]:
+        """The first derivatives of the gaps, or of those that rest the second ones, and what of them is rounding."""
+        drift, off = self._drifts(sides)
+        if not self._rests.any():
+            return drift, off
+        second = self._second(sides)
+        return np.where(self._rests, second, drift), np.where(self._rests, RESTS * np.abs(second), off)
+
     def _second(self, sides: Sequence[int]) -> Array:
-        modes = self._of.values.copy()
-        modes[self._among] = self._modes(sides)
-        point = self._of._point(self._t, self._x, self._p, modes[:, None])
+        point = self._of._point(self._t, self._x, self._p, self._modes_at(sides)[:, None])
         return outputs_of(_drift(self._of.plain, 2), point)[self._among, 0]
 
     def _wrong(self, sides: Sequence[int]) -> list[tuple[int, int]]:
         """Surfaces that do not let the motion go on with these sides, and where they send it."""
         base = [side or -1 for side in sides]
         slides = [k for k, side in enumerate(sides) if side == 0]
-        drift, off = self._drifts(base)
+        drift, off = self._motions(base)
         wrong = list[tuple[int, int]]()
         if slides:
-            columns = [self._drifts([*base[:k], 1, *base[k + 1 :]])[0] - drift for k in slides]
+            columns = [self._motions([*base[:k], 1, *base[k + 1 :]])[0] - drift for k in slides]
             matrix = np.array(columns).T
             with np.errstate(all="ignore"):
                 shares = np.linalg.lstsq(matrix[slides], -drift[slides], rcond=None)[0]
                 left = np.abs(drift[slides] + matrix[slides] @ shares)
             for i, k in enumerate(slides):
-                scale = abs(columns[i][k])
-                slack = 1e-9 if scale > 0.0 else 0.0
-                if not columns[i][k] < -off[k] or not left[i] <= 1e-9 * scale:
+                size = abs(columns[i][k])
+                if not columns[i][k] < -off[k] or not left[i] <= RESTS * size:
                     wrong.append((k, 1 if drift[k] > 0.0 else -1))
-                elif not -slack <= shares[i] <= 1.0 + slack:
+                elif not -RESTS <= shares[i] <= 1.0 + RESTS:
                     wrong.append((k, 1 if shares[i] > 0.5 else -1))
             drift = drift + matrix @ shares
-        second: Array | None = None
         for k, side in enumerate(sides):
             if side and not side * drift[k] > off[k]:
-                if side * drift[k] < -off[k]:
+                leaves = side * drift[k] < -off[k]
+                if leaves or (not (slides or self._rests[k]) and side * self._second(sides)[k] < 0.0):
                     wrong.append((k, -side))
-                elif not slides:
-                    second = self._second(sides) if second is None else second
-                    if side * second[k] < 0.0:
-                        wrong.append((k, -side))
         return wrong
 
     def _pivoted(self, wanted: Sequence[int]) -> Array | None:

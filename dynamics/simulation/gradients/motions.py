@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -24,7 +25,7 @@ from ...systems.ode_system import OdeSystem
 from ...systems.system import System
 from ..applied_force import Hold, SampledController
 from ..events.event import Event, EventProgram, as_events, event_program
-from ..events.modes import Turn
+from ..events.modes import Modes, Turn
 from ..outcome import MotionError, Recorder
 from ..run import Run
 from ..run_options import METHOD, Options, Span, Steps, known_options, time_span
@@ -33,6 +34,7 @@ from ..steps.dense_output import Indices
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
 from .motion_programs import MotionEquations, motion_equations, outputs_at, pullback, sliding_equations
+from .surfaces_at_once import entries
 
 Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"
@@ -106,8 +108,8 @@ class Motions:
 
     x: (m, N), where they start, in q and qd.  steps: none of chosen steps before they are run.
     tau: the applied forces that are inputs, (forces, N), or where they change with the steps, (steps, forces, N).
-    values: of the parameters p that stay inputs, of the numbers c and of modes, (.., N).  said: doubts, a sentence each.
-    after: graphs of a reset at the end of the last steps.
+    values: of the parameters p that stay inputs, of the numbers c and of modes, (.., N).
+    said: doubts, a sentence each.  after: graphs of a reset at the end of the last steps.
     """
 
     equations: MotionEquations
@@ -195,7 +197,7 @@ class Motions:
                 recorder.record(block)
         if run.status:
             raise MotionError(f"the motion did not reach t_end, {run.status}")
-        steps, after = self._cut(recorder.table()[0], run)
+        steps, after = self._cut(*recorder.table(), run)
         return replace(self, steps=steps, after=after, said=tuple(run.warnings))
 
     def in_stretch(self, steps: Stretch) -> Motions:
@@ -207,59 +209,61 @@ class Motions:
         tau = self.tau if steps.rows is None else self.tau[steps.rows]
         return replace(self, equations=equations, values=values, tau=tau)
 
-    def _cut(self, times: Array, run: Stepper) -> tuple[tuple[Stretch, ...], tuple[Graph, ...]]:
+    def _cut(self, times: Array, states: Array, run: Stepper) -> tuple[tuple[Stretch, ...], tuple[Graph, ...]]:
         """The accepted steps, between the events that reset the state or end the motion, and crossings of surfaces.
 
         And graphs of a reset after the last.
 
-        times: (T,), the start, the ends of the steps, and an instant twice where an event resets the state.
+        times: (T,), the start, the ends of the steps, and an instant twice where an event resets the state, (T, m).
         """
         happened = [] if run.log is None else [(run.log.program.events[k], t) for k, t, _ in run.log.happened]
-        turns = [] if run.modes is None else list(run.modes.turns)
-        parts, stretches = np.split(times, np.flatnonzero(np.diff(times) == 0.0) + 1), list[Stretch]()
-        entry = () if self.equations.start is None else (self.equations.start,)
-        for number, whole in enumerate(parts):
-            resets = number < len(parts) - 1
-            at = [each for each, when in happened if when == whole[-1] and (each.reset if resets else each.terminal)]
+        breaks = [0, *(np.flatnonzero(np.diff(times) == 0.0) + 1).tolist(), len(times)]
+        stretches, entry = list[Stretch](), () if self.equations.start is None else (self.equations.start,)
+        for first, last in itertools.pairwise(breaks):
+            resets, t_end = last < len(times), times[last - 1]
+            at = [each for each, when in happened if when == t_end and (each.reset if resets else each.terminal)]
             if (resets or run.event) and len(at) != 1:
                 names = ", ".join([each.name for each in at])
-                raise ValueError(
-                    f"events {names} happen at one instant, t = {whole[-1]:.6g} s, which has no derivative"
-                )
-            inside = [] if run.modes is None else np.flatnonzero(np.isin(whole, [turn.t for turn in turns]))
-            ends = [*[k for k in inside if 0 < k < len(whole) - 1], len(whole) - 1]
-            for k, (first, last) in enumerate(zip([0, *ends[:-1]], ends, strict=True)):
-                made = _stretch(whole[first : last + 1], np.diff(whole[first : last + 1]))
-                if run.modes is not None:
-                    turn, turns = _turn_at(turns, whole[first])
-                    slides = turn.among if turn.slid else None
-                    made = made._replace(slides=slides, modes=turn.modes)
-                    if slides is not None and k == 0:
-                        onto = sliding_equations(self.equations, slides).problem.projection
-                        entry = (*entry, onto) if onto else entry
-                    following = next((each for each in turns if each.t == whole[last]), None)
-                    if last < len(whole) - 1 and following is not None:
-                        name = "a surface that is crossed"
-                        made = made._replace(arrival=Arrival(name, run.modes.arrival(turn, following)))
-                if last == len(whole) - 1 and at:
-                    made = made._replace(arrival=Arrival(f"event {at[0].name!r}", at[0].values))
-                if last > first:
-                    rows = None
-                    if self.each_step:
-                        place = np.abs(made.t[:-1] - self.span.t0) / self.span.length * len(self.tau)
-                        rows = np.minimum((place + SAME_ROW).astype(np.intp), len(self.tau) - 1)
-                    stretches.append(made._replace(entry=entry, rows=rows))
-                    entry = ()
-            entry = (at[0].reset,) if resets and at[0].reset else ()
+                raise ValueError(f"events {names} happen at one instant, t = {t_end:.6g} s, which has no derivative")
+            made = self._turned(times[first:last], states[first:last], run.modes, entry)
+            if made and at:
+                made[-1] = made[-1]._replace(arrival=Arrival(f"event {at[0].name!r}", at[0].values))
+            stretches += made
+            entry = (at[0].reset,) if resets and at[0].reset else () if made else entry
         return tuple(stretches), entry
 
+    def _turned(self, t: Array, x: Array, modes: Modes | None, entry: tuple[Graph, ...]) -> list[Stretch]:
+        """Steps that end at t (T,) and x (T, m), from an entry on, between crossings of surfaces."""
+        turns = [] if modes is None else modes.turns
+        instants = {turn.t for turn in turns}
+        ends = [k for k in range(1, len(t)) if k == len(t) - 1 or t[k] in instants]
+        result = list[Stretch]()
+        for first, last in itertools.pairwise([0, *ends]):
+            made = _stretch(t[first : last + 1], np.diff(t[first : last + 1]))
+            if self.each_step:
+                place = np.abs(made.t[:-1] - self.span.t0) / self.span.length * len(self.tau)
+                made = made._replace(rows=np.minimum((place + SAME_ROW).astype(np.intp), len(self.tau) - 1))
+            if modes is not None:
+                turn = _turn_at(turns, t[first])
+                if turn.slides is not None and not first:
+                    onto = sliding_equations(self.equations, turn.slides).problem.projection
+                    entry = (*entry, onto) if onto else entry
+                made = made._replace(slides=turn.slides, modes=turn.modes)
+            result.append(made._replace(entry=entry))
+            if modes is not None and last < len(t) - 1:
+                after = _turn_at(turns, t[last])
+                (k, number), *_ = modes.crossed(turn, after)
+                arrival = Arrival(f"surface {modes.words[k]!r}", modes.margin(turn, number))
+                result[-1] = result[-1]._replace(arrival=arrival)
+                of_turn = self.inputs[: len(self.inputs) - len(turn.modes), 0], turn.modes
+                entry = entries(modes, turn, after, np.concatenate([x[last], t[last : last + 1], *of_turn]))
+        return result
 
-def _turn_at(turns: Sequence[Turn], t: float) -> tuple[Turn, list[Turn]]:
-    """The last of the turns that come first and are at an instant, and those after it."""
-    count = 1
-    while count < len(turns) and turns[count].t == t:
-        count += 1
-    return turns[count - 1], list(turns[count:])
+
+def _turn_at(turns: Sequence[Turn], t: float) -> Turn:
+    """The turn at an instant: of several the modes after the last, and what was zero at the first."""
+    at = [turn for turn in turns if turn.t == t]
+    return at[-1]._replace(number=at[0].number)
 
 
 def _row_controller(rows: Array, span: Span) -> SampledController:
@@ -338,7 +342,8 @@ class Differentiation:
         if not (options.adaptive or watched or equations.modes):
             by_rows = rows is not None and options.dt is None
             steps_count = len(tau) if by_rows else step_count(span.length, options.step)
-            steps = (_equal_stretch(span.t0, span.t_end, steps_count),)
+            entry = () if equations.start is None else (equations.start,)
+            steps = (_equal_stretch(span.t0, span.t_end, steps_count)._replace(entry=entry),)
         return Motions(equations, options, span, start.x.T.copy(), tau, values, wrt, final, running, watched, steps)
 
     def _names(self, inputs: StateInputs) -> tuple[str, ...]:
