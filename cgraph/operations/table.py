@@ -44,20 +44,15 @@ def _above(a: Node, b: Node) -> Node:
 
     What was made later has the larger number. So all kinks see one side: those of x - y and y - x, of 2 x and x / -3.
     """
-    parts, values, number = [a, b], dict[Node, float](), 1e15
+    parts, values = [a, b], dict[Node, float]()
     for node in parts:  # which grow in number
         parts += node.args if node.op.name in _WRITTEN_OUT and len(parts) < _MOST_PARTS else ()
     for node in sorted({*parts}, key=lambda x: (bool(x.args), x.serial)):  # variables first: copies are made after them
         if node.op.name in _WRITTEN_OUT and values.keys() >= {*node.args}:
             values[node] = node.op.scalar(*[values[arg] for arg in node.args])
         else:
-            number *= 1e3
-            values[node] = number if node.value is None else node.value
+            values[node] = 1e15 * 1e3 ** len(values) if node.value is None else node.value
     return less_equal(b, a) if values[a] > values[b] else less(b, a)
-
-
-def _chosen(first: Node) -> tuple[Node, Node]:
-    return first, where(first, 0.0, 1.0)
 
 
 def _flat(y: Node, *args: Node) -> tuple[float, ...]:
@@ -227,13 +222,13 @@ ROWS = (
        rounding=0.0, llvm=texts.LLVM_SIGN, c="{0} > 0.0 ? 1.0 : ({0} < 0.0 ? -1.0 : ({0} != {0} ? {0} : 0.0))",
        javascript="(a) => (a !== a ? a : (a > 0) - (a < 0))"),
     Op("minimum", 2, lambda a, b: a if a <= b or a != a else b, values.minimum_arrays,
-       lambda y, a, b: _chosen(_above(b, a)), ((0.3, -0.7), (-0.7, 0.3)), about="The smaller of a and b.",
+       lambda y, a, b: ((first := _above(b, a)), where(first, 0.0, 1.0)), ((0.3, -0.7), (-0.7, 0.3)), about="The smaller of a and b.",
        symbol="min", ufunc=np.minimum, commutative=True, selects=True, fold=folding.same,
        piece=lambda side: (int(side > 0), 1), domain=(_REAL, _REAL), interval=bounds.minimum, rounding=0.0,
        llvm=texts.LLVM_MINIMUM, c="({0} <= {1} || {0} != {0}) ? {0} : {1}",
        javascript="(a, b) => (a <= b || a !== a ? a : b)"),
     Op("maximum", 2, lambda a, b: a if a >= b or a != a else b, values.maximum_arrays,
-       lambda y, a, b: _chosen(_above(a, b)), ((0.3, -0.7), (-0.7, 0.3)), about="The larger of a and b.",
+       lambda y, a, b: ((first := _above(a, b)), where(first, 0.0, 1.0)), ((0.3, -0.7), (-0.7, 0.3)), about="The larger of a and b.",
        symbol="max", ufunc=np.maximum, commutative=True, selects=True, fold=folding.same,
        piece=lambda side: (int(side < 0), 1), domain=(_REAL, _REAL), interval=bounds.maximum, rounding=0.0,
        llvm=texts.LLVM_MAXIMUM, c="({0} >= {1} || {0} != {0}) ? {0} : {1}",
@@ -274,6 +269,7 @@ ROWS = (
 
 for _row in ROWS:
     enter(_row)
+FLAT = {row.name for row in ROWS if row.partials is _flat}
 
 sqrt: Function = function(OPS["sqrt"])
 exp: Function = function(OPS["exp"])
