@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Iterator
 from typing import Any, Generic, NamedTuple, TypeVar
 from weakref import WeakValueDictionary
 
-INPUT, PRIMAL, ADJOINT, TANGENT = "input", "primal", "adjoint", "tangent"
+INPUT, PRIMAL, ADJOINT, TANGENT, SMOOTH = "input", "primal", "adjoint", "tangent", "smooth"
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
 
@@ -93,7 +93,7 @@ class Label:
     """Meaning of a node: tags of the person who wrote it, roles from differentiation, and source lines.
 
     Labels of the same sets are one object, so that most comparisons are of pointers.
-    roles: among "input", "primal", "adjoint", "tangent", see `Node`.
+    roles: among "input", "primal", "adjoint", "tangent", "smooth", see `Node`.
     """
 
     __slots__ = ("__weakref__", "_derived", "_lines", "_tags", "has_tags", "roles")
@@ -117,7 +117,7 @@ class Label:
         """The label of a derivative node: tags and lines of its origin, and the role of the derivative."""
         found = self._derived.get(role)
         if found is None:
-            roles = (self.roles - {INPUT, PRIMAL}) | {role}
+            roles = (self.roles - {INPUT, PRIMAL, SMOOTH}) | {role}
             found = self if roles == self.roles else _label(self._tags, roles, self._lines)
             if found is not self:  # a label that refers to itself would wait for the garbage collector
                 self._derived[role] = found
@@ -138,10 +138,11 @@ class Label:
         return _label(self._tags | other._tags, self.roles, self._lines if self._lines.size else other._lines)
 
     def union(self, other: Label) -> Label:
-        """The label of two nodes merged into one."""
+        """The label of two nodes merged into one, which is smooth if both are."""
         if self is other:
             return self
-        return _label(self._tags | other._tags, self.roles | other.roles, self._lines | other._lines)
+        roles = (self.roles | other.roles) - ({SMOOTH} - (self.roles & other.roles))
+        return _label(self._tags | other._tags, roles, self._lines | other._lines)
 
     def __repr__(self) -> str:
         return f"<Label {sorted(self.tags)} {sorted(self.roles)} {sorted(self.lines)}>"

@@ -40,7 +40,8 @@ class Node:
     tags : frozenset of str
         Set by `cg.tag`.
     roles : frozenset of str
-        "input": a variable; "primal": made outside differentiation; "adjoint", "tangent": by reverse, by forward mode.
+        "input": a variable; "primal": made outside differentiation; "adjoint", "tangent": by reverse, by forward mode;
+        "smooth": a comparison across which value and slope of what it chooses go on, as in a smooth table of `interp`.
     lines : frozenset of SourceLine
         Where it was written, if `cg.recording_lines` was on.
 
@@ -94,7 +95,7 @@ class Node:
 
     @property
     def roles(self) -> frozenset[str]:
-        """Among "input", "primal", "adjoint", "tangent"; several after a merge or a second derivative."""
+        """Among "input", "primal", "adjoint", "tangent", "smooth"; several after a merge or a second derivative."""
         return self.label.roles
 
     @property

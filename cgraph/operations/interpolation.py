@@ -8,10 +8,12 @@ from itertools import pairwise
 
 from ..core.builder import Builder
 from ..core.evaluation import real_array
+from ..core.label import SMOOTH, label
 from ..core.node import Node, Scalar, as_node
-from ..core.scope import building
+from ..core.scope import building, current
 from ..util.require import require_choice, require_sequence
-from .table import abs_, less, not_equal, sign, where
+from .operation import OPS
+from .table import abs_, maximum, minimum, not_equal, sign, where
 
 Piece = list[Node]  # a_0, a_1, .. of the polynomial a_0 + a_1 t + a_2 t**2 + .., t = x - start
 
@@ -73,7 +75,9 @@ def interp(
         pieces = _pieces(knots, _values(ys, len(knots)), _SLOPES[kind], straight=outside == "linear")
     if any([each.value is not None and not math.isfinite(each.value) for piece in pieces for each in piece]):
         raise ValueError("interp: a slope of the table is too large for float64")
-    bits, start = _searched(at, [as_node(knot) for knot in knots])
+    if kind != "linear" and outside == "constant":  # the kinks at the ends are these, and no comparison has one
+        at = minimum(maximum(at, knots[0]), knots[-1])
+    bits, start = _searched(at, [as_node(knot) for knot in knots], {SMOOTH} if kind != "linear" else set())
     t = at - start
     *coefficients, y = [_chosen([*row], bits) for row in reversed([*zip(*pieces, strict=True)])]
     value = coefficients[0]
@@ -183,17 +187,19 @@ def _natural(h: list[float], rise: list[Node]) -> list[Node]:
 _SLOPES = {"linear": None, "monotone": _monotone, "natural": _natural}
 
 
-def _searched(at: Node, knots: list[Node]) -> tuple[list[Node], Node]:
+def _searched(at: Node, knots: list[Node], roles: set[str]) -> tuple[list[Node], Node]:
     """Bisection: whether x is left of a knot, step by step, and the knot that it ends at, left of x, or the first.
 
-    The last knot stands for those that are missing to a power of two, less one.
+    The last knot stands for those that are missing to a power of two, less one. The comparisons get these roles, too.
     """
     steps, start = len(knots).bit_length(), knots[0]
     knots = [*knots, *[knots[-1]] * (2**steps - 1 - len(knots))]
     bits: list[Node] = []
+    build, told = current.get().build or Node, current.get().label
+    told = label(told.tags, told.roles | roles, told.lines)
     for step in reversed(range(steps)):
         knot = _chosen(knots[2**step - 1 :: 2 ** (step + 1)], bits)
-        bits.append(less(at, knot))
+        bits.append(build(OPS["less"], (at, knot), told))
         start = start if start is knot else where(bits[-1], start, knot)
     return bits, start
 

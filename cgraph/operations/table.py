@@ -7,14 +7,15 @@ import operator
 
 import numpy as np
 
-from ..core.node import Node
+from ..core.node import Node, constant
 from . import bounds, folding, series, texts, values
 from .functions import Function, function
 from .operation import FUNCTION, OPS as OPS, PRODUCT, RELATION, SUM, MathML, Op, enter  # noqa: PLC0414
 from .values import ieee
 
 
-# Conventions where there is no derivative: abs'(0) = 0; a tie of minimum or maximum gives one half to each argument;
+# Conventions where there is no derivative: abs, minimum and maximum have the slope of one branch, for an average does not
+# compose (abs(x)**2 has the second slope 2), and that of one side all over a graph, see `_above`: abs'(0) = 1;
 # sqrt'(0) = cbrt'(0) = +inf, their limit; hypot'(0, 0) = 0; d(x**y)/dy at x = y = 0 is 0; atan2 at the origin is NaN;
 # floor, ceil, round and fmod have where they jump the slope that they have beside it.
 def _pow_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
@@ -38,8 +39,20 @@ def _tanh_partials(y: Node, a: Node) -> tuple[Node]:
     return (zero_safe_mul(sech, sech),)
 
 
-def _less_partials(y: Node, a: Node, b: Node, above: Node, below: Node) -> tuple[Node, Node]:
-    return where(above, 1.0, where(below, 0.0, 0.5)), where(below, 1.0, where(above, 0.0, 0.5))
+def _above(a: Node, b: Node) -> Node:
+    """Whether a > b; where they are equal, whether it is so with large numbers for what they are made of.
+
+    What was made later has the larger number. So all kinks see one side: those of x - y and y - x, of 2 x and x / -3.
+    """
+    parts, values = [a, b], dict[Node, float]()
+    for node in parts:  # which grow in number
+        parts += node.args if node.op.name in _WRITTEN_OUT and len(parts) < _MOST_PARTS else ()
+    for node in sorted({*parts}, key=lambda x: (bool(x.args), x.serial)):  # variables first: copies are made after them
+        if node.op.name in _WRITTEN_OUT and values.keys() >= {*node.args}:
+            values[node] = node.op.scalar(*[values[arg] for arg in node.args])
+        else:
+            values[node] = 1e15 * 1e3 ** len(values) if node.value is None else node.value
+    return less_equal(b, a) if values[a] > values[b] else less(b, a)
 
 
 def _flat(y: Node, *args: Node) -> tuple[float, ...]:
@@ -67,6 +80,7 @@ _POSITIVE = (0.4, 2.5)
 _UNIT = (-0.8, 0.8)
 _INF = math.inf
 _SMALLEST_FLOAT = math.ulp(0.0)
+_WRITTEN_OUT, _MOST_PARTS = ("add", "sub", "neg", "mul", "div", "abs", "minimum", "maximum"), 32
 
 # By place: name, arity, value on floats, value on arrays, partials of (output y, arguments), samples. The rest by name.
 # A table is read by columns, so the formatter leaves it alone.
@@ -182,7 +196,7 @@ ROWS = (
        domain=((-2.0, 2.0),), interval=bounds.cosh),
     Op("tanh", 1, math.tanh, np.tanh, _tanh_partials, ((0.3,),),
        about="The hyperbolic tangent of x.", domain=((-2.0, 2.0),), interval=bounds.Rising("tanh", bounds=(-1.0, 1.0))),
-    Op("abs", 1, abs, np.absolute, lambda y, a: (sign(a),), ((0.3,), (-0.7,)), about="The size of x, without its sign.",
+    Op("abs", 1, abs, np.absolute, lambda y, a: (where(_above(constant(0.0), a), -1.0, 1.0),), ((0.3,), (-0.7,)), about="The size of x, without its sign.",
        symbol="|x|", mathml=MathML("<mo>|</mo>{0}<mo>|</mo>", (0,), FUNCTION), domain=(_REAL,),
        fold=lambda a: abs(a.args[0]) if a.op.name == "neg" else None, piece=lambda side: (0, -1 if side < 0 else 1),
        interval=bounds.magnitude, rounding=0.0, llvm=texts.llvm_intrinsic("fabs"), c="fabs({0})"),
@@ -208,13 +222,13 @@ ROWS = (
        rounding=0.0, llvm=texts.LLVM_SIGN, c="{0} > 0.0 ? 1.0 : ({0} < 0.0 ? -1.0 : ({0} != {0} ? {0} : 0.0))",
        javascript="(a) => (a !== a ? a : (a > 0) - (a < 0))"),
     Op("minimum", 2, lambda a, b: a if a <= b or a != a else b, values.minimum_arrays,
-       lambda y, a, b: _less_partials(y, a, b, a < b, b < a), ((0.3, -0.7), (-0.7, 0.3)), about="The smaller of a and b.",
+       lambda y, a, b: ((first := _above(b, a)), where(first, 0.0, 1.0)), ((0.3, -0.7), (-0.7, 0.3)), about="The smaller of a and b.",
        symbol="min", ufunc=np.minimum, commutative=True, selects=True, fold=folding.same,
        piece=lambda side: (int(side > 0), 1), domain=(_REAL, _REAL), interval=bounds.minimum, rounding=0.0,
        llvm=texts.LLVM_MINIMUM, c="({0} <= {1} || {0} != {0}) ? {0} : {1}",
        javascript="(a, b) => (a <= b || a !== a ? a : b)"),
     Op("maximum", 2, lambda a, b: a if a >= b or a != a else b, values.maximum_arrays,
-       lambda y, a, b: _less_partials(y, a, b, b < a, a < b), ((0.3, -0.7), (-0.7, 0.3)), about="The larger of a and b.",
+       lambda y, a, b: ((first := _above(a, b)), where(first, 0.0, 1.0)), ((0.3, -0.7), (-0.7, 0.3)), about="The larger of a and b.",
        symbol="max", ufunc=np.maximum, commutative=True, selects=True, fold=folding.same,
        piece=lambda side: (int(side < 0), 1), domain=(_REAL, _REAL), interval=bounds.maximum, rounding=0.0,
        llvm=texts.LLVM_MAXIMUM, c="({0} >= {1} || {0} != {0}) ? {0} : {1}",
@@ -255,6 +269,7 @@ ROWS = (
 
 for _row in ROWS:
     enter(_row)
+FLAT = {row.name for row in ROWS if row.partials is _flat}
 
 sqrt: Function = function(OPS["sqrt"])
 exp: Function = function(OPS["exp"])

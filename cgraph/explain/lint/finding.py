@@ -17,7 +17,7 @@ class Finding:
     Attributes
     ----------
     kind : str
-        "dependence", "missing dependence", "unused input", "singular" or "cancellation".
+        "dependence", "missing dependence", "unused input", "singular", "cancellation" or "guard by equality".
     text : str
         The sentence, in the person's names.
     nodes : tuple of Node

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 
 from ...core.graph import Edge, Graph
 from ...core.html_text import html_table, html_text
+from ...core.label import PRIMAL
 from ...core.node import Node
+from ...operations.table import FLAT
 from ...util.json_type import Json
 from ...util.require import require_graph, require_mapping, require_sequence
 from ...util.words import counted
@@ -32,7 +34,7 @@ class Lint:
     graph : Graph
         What was checked.
     findings : tuple of Finding
-        What is not as declared.
+        What is not as declared, and guards by equality.
     notes : tuple of Finding
         What was not declared but may be a slip, such as an input that nothing uses.
     proofs : tuple of str
@@ -53,7 +55,7 @@ class Lint:
 
     @property
     def ok(self) -> bool:
-        """Whether all that was declared holds."""
+        """Whether there is no finding: all that was declared holds."""
         return not self.findings
 
     @property
@@ -100,6 +102,8 @@ def lint(
     names: Mapping[str, str] | None = None,
 ) -> Lint:
     """Check what is declared of a graph; a declaration ends in a proof or in the nodes and edges to blame.
+
+    Guards by equality, as `where(x == 0, 1, sin(x) / x)`, are blamed undeclared: slopes there are those of one point.
 
     Parameters
     ----------
@@ -151,7 +155,7 @@ def lint(
     if not isinstance(function, str):
         raise TypeError(f"function must be the name of one, got {type(function).__name__}: {function!r:.60}")
     known = Names(graph, names)
-    findings: list[Finding] = []
+    findings = _guards_by_equality(known)
     proofs: list[str] = []
     for first, second in _pairs(independent):
         violations, held = check_independence(known, first, second, function)
@@ -196,6 +200,37 @@ def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
         if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
             raise ValueError(f"independent: each entry must be a pair of groups, got {pair!r:.60}")
     return [(first, second) for first, second in pairs]
+
+
+_GUARD = """{}: at exactly this point the slope is that of the branch chosen there, which holds nowhere beside it; \
+choose a series near it by <, or take a function of the library, such as abs(x) for sign(x) * x."""
+_COMPARED = {"where": 1, "equal": 2, "not_equal": 2}  # arguments
+_MOST = 32  # factors that are looked at
+
+
+def _guards_by_equality(names: Names) -> list[Finding]:
+    """Choices by == or by what is not 0 that somebody wrote of what is used besides, and products sign(x) * x."""
+    nodes, flat = names.graph.nodes, set[Node]()
+    for node in nodes:
+        if node.value is not None or node.op.name in FLAT or (node.args and flat.issuperset(node.args)):
+            flat.add(node)
+    used = {arg for node in nodes if node not in flat for arg in node.args[node.op.name == "where" :]} - flat
+    findings = []
+    for node in nodes:
+        by = [arg for arg in node.args[: _COMPARED.get(node.op.name, 0)] if arg not in flat]
+        signed = _is_signed(node) and not any(map(_is_signed, node.args))
+        if PRIMAL in node.roles and (signed or not used.isdisjoint(ancestors(by))):
+            data: dict[str, Json] = {"number": names.number[node], "tags": sorted(node.tags)}
+            findings.append(Finding("guard by equality", _GUARD.format(names.line(node)), (node,), data=data))
+    return findings
+
+
+def _is_signed(node: Node) -> bool:
+    """Whether sign(x) and x are factors of a product, or of products that are its factors."""
+    factors = [*node.args] if node.op.name == "mul" else []
+    for x in factors:  # which grow in number
+        factors += x.args if x.op.name == "mul" and len(factors) < _MOST else ()
+    return any([x.op.name == "sign" and x.args[0] in factors for x in factors])
 
 
 def _unused_inputs(names: Names) -> list[Finding]:

@@ -125,13 +125,14 @@ CONVENTIONS = [
     *[("0**y", lambda y, x: x**y, (float(n), 0.0), 0.0, 0.0) for n in (0.5, 1, 2, 3)],  # 0 for every y near
     ("0**0", lambda y, x: x**y, (0.0, 0.0), 0.0, None),
     ("sqrt", cg.sqrt, (0.0,), INF, -INF),
-    ("abs", abs, (0.0,), 0.0, 0.0),
+    ("abs", abs, (0.0,), 1.0, 0.0),
     *[("hypot", cg.hypot, (x, 0.0), 0.0, None) for x in (0.0, -0.0)],
     ("hypot", cg.hypot, (3.0, 0.0), 1.0, None),
     ("hypot", cg.hypot, (0.0, 4.0), 0.0, 0.25),  # 1 / y
-    *[(f.__name__, f, (0.3, 0.3), 0.5, None) for f in (cg.minimum, cg.maximum)],  # a tie: one half to each argument
-    *[(f.__name__, lambda x, y, f=f: f(y, x), (0.3, 0.3), 0.5, None) for f in (cg.minimum, cg.maximum)],
-    *[(f.__name__, lambda x, f=f: f(x, x), (0.3,), 1.0, None) for f in (cg.minimum, cg.maximum)],
+    ("maximum", cg.maximum, (0.3, 0.3), 0.0, 0.0),  # as if y, which was made later, were larger
+    ("maximum", lambda x, y: cg.maximum(y, x), (0.3, 0.3), 0.0, 0.0),
+    ("minimum", cg.minimum, (0.3, 0.3), 1.0, 0.0),
+    ("maximum", lambda x: cg.maximum(0.3, x), (0.3,), 1.0, 0.0),  # and a constant smaller
     *[(f.__name__, lambda x, f=f: f(x * x, 2 * x - 1), (1.0,), 2.0, None) for f in (cg.minimum, cg.maximum)],
 ]
 
@@ -141,6 +142,35 @@ def test_derivatives_at_limits_are_those_of_a_side_or_a_convention(name, functio
     found = derivatives(function, *point)
     assert found["first"] == [first] * 3
     assert second is None or found["second"] == [second] * 6
+
+
+KINKED = {  # at x = y = 1 a kink for each operand, none in what is made of them: that, written without one
+    "even power": (lambda x, y: abs(1 - x) ** 4 + abs(x - 1) ** 2, lambda x, y: (x - 1) ** 4 + (x - 1) ** 2),
+    "even function": (lambda x, y: cg.cosh(abs(abs(x - y))), lambda x, y: cg.cosh(x - y)),
+    "both signs": (lambda x, y: abs(2 * x - 2 * y) * abs((y - x) / 4), lambda x, y: (x - y) ** 2 / 2),
+    "both parts": (lambda x, y: cg.maximum(x, 1) ** 2 + cg.minimum(x, 1) ** 2, lambda x, y: x**2 + 1),
+    "stops": (lambda x, y: cg.maximum(x - 1, 0) ** 2 + cg.maximum(1 - x, 0) ** 2, lambda x, y: (x - 1) ** 2),
+    "product": (lambda x, y: cg.maximum(x, y) * cg.minimum(y, x), lambda x, y: x * y),
+    "sum": (lambda x, y: (cg.maximum(x, y) + cg.minimum(x, y)) ** 2, lambda x, y: (x + y) ** 2),
+    "middle": (
+        lambda x, y: (
+            cg.maximum(cg.maximum(x, y), 1)
+            * cg.maximum(cg.minimum(x, y), cg.minimum(cg.maximum(y, x), 1))
+            * cg.minimum(1, cg.minimum(x, y))
+        ),
+        lambda x, y: x * y,
+    ),
+    "size": (lambda x, y: cg.maximum(x - y, y - x) * abs(x - y), lambda x, y: (x - y) ** 2),
+    "half": (lambda x, y: cg.maximum(x, y) * (x + y - abs(y - x)) / 2, lambda x, y: x * y),
+    "branches": (lambda x, y: cg.where(x < 1, 1 - x, x - 1) * abs(1 - x), lambda x, y: (x - 1) ** 2),
+}
+
+
+@each_row("name", KINKED)
+def test_kinks_that_cancel_leave_the_slopes_of_what_is_smooth(name):
+    found, expected = [derivatives(each, 1.0, 1.0) for each in KINKED[name]]
+    for order in ("first", "second"):
+        assert found[order] == pytest.approx(expected[order], rel=TOLERANCE)
 
 
 def test_atan2_at_the_origin_has_no_derivative():

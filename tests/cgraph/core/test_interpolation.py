@@ -1,6 +1,7 @@
 """`interp`: tables as functions, beside NumPy's and SciPy's, and alike on every back end."""
 
 import math
+import pickle
 import re
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.explain.lint.singular import intervals
+from cgraph.operations.table import FLAT
 from tests.cgraph.codegen.test_c import agrees, needs_cc
 from tests.cgraph.engines import ENGINES, evaluated
 from tests.each_row import each_row
@@ -124,6 +126,23 @@ def test_c_has_the_bits_of_evaluation(tmp_path):
 def test_javascript_has_the_bits_of_evaluation():
     graph, points = all_kinds()
     assert same(evaluated_by_js(cg.to_js(graph), points), evaluated(graph, points))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_comparisons_say_whether_their_knots_are_kinks_through_all_transforms(kind):
+    at, k = cg.variables("at k")
+    knots, values = [0.0, 1.0, 3.0, 4.0], [0.0, 2.0, 1.0, 1.5]
+
+    def smooth(graph):
+        return {"smooth" in node.roles for node in graph.nodes if node.op.name in FLAT}
+
+    table = cg.Graph([at, k], {"y": k * cg.interp(at * at, knots, values, kind, "linear")})
+    slopes = cg.jvp(cg.gradient(cg.simplify(table), "at"), "at")
+    held = cg.Graph([at], {"y": cg.interp(at, knots, values, kind)})  # its ends are kinks of minimum and maximum
+    for graph in (table, held, slopes, cg.specialize(slopes, {"at": k + 1.0}), pickle.loads(pickle.dumps(slopes))):
+        assert smooth(graph) == {kind != "linear"}
+    beside = cg.Graph([at, k], {"y": table.outputs["y"] + cg.where(at * at < 1.0, at, k)})
+    assert smooth(cg.simplify(beside)) == {kind != "linear", False}
 
 
 def test_bounds_hold():

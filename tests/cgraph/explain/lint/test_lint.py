@@ -339,6 +339,27 @@ def test_what_is_exact_cancels_without_loss():
     assert "leaves 0; 16 digits are lost here, 0 remain" in str(lint(graph, at={"x": 0.1}))
 
 
+GUARDED = {  # what somebody wrote: whether its slope at a point is of that point alone
+    "equal": (cg.where(cg.equal(x, 0), 1, cg.sin(x) / x), True),
+    "not equal, within": (cg.where((x > -1) * cg.not_equal(x - y, 0), cg.sin(x - y) / (x - y), 1), True),
+    "not 0": (cg.where(x, cg.sin(x) / x, 1), True),
+    "size by sign": ((-2 * cg.sign(x) * x) ** 2, True),
+    "region": (cg.where(x < 1e-4, 1, cg.sin(x) / x), False),
+    "mode": (cg.where(cg.equal(y, 2), cg.sin(x), x), False),
+    "signs": (cg.where(cg.equal(cg.sign(x), cg.sign(y)), x, y), False),
+    "drag": (-cg.sign(x) * x**2 * y - cg.sign(x) * y, False),
+    "own rules": (x**y * abs(x) + cg.maximum(x, cg.log(y)) + cg.interp(x, [0, 1, 2], [y, 2, y], "monotone"), False),
+}
+
+
+@each_row("name", GUARDED)
+def test_guards_by_equality_are_blamed_and_the_rules_of_the_library_are_not(name):
+    f, guarded = GUARDED[name]
+    found = lint(cg.Graph([x, y], {"f": f}))
+    assert [each.kind for each in found.findings] == ["guard by equality"] * guarded
+    assert guarded or all(lint(derived(found.graph)).ok for derived in (cg.gradient, cg.hessian, cg.jvp))
+
+
 def test_deep_graphs_need_no_recursion():
     node = x
     for _ in range(5_000):
