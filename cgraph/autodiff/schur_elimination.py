@@ -114,7 +114,7 @@ class EdgePushing(SymmetricElimination):
                 dots[variable] = p * rest
         else:  # t_z = sum_k p_k t_k
             terms = [self.product(step, p, dots[self.unknown(arg)]) for arg, p in self.partials[step].items()]
-            dots[step] = _total(terms)
+            dots[step] = sum(terms[1:], start=terms[0])
 
     def finish(self) -> None:
         """Take out the unknowns that wait, and give them their tangents."""
@@ -231,13 +231,6 @@ class EdgePushing(SymmetricElimination):
             if a in self.depends and b in self.depends:
                 term = self.product(node, bar, second)
                 self.matrix.add(self.unknown(a), self.unknown(b), 2.0 * term if a is b and j != k else term)
-
-
-def _total(terms: list[Node]) -> Node:
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
-    return total
 
 
 class _VariableSum(NamedTuple):

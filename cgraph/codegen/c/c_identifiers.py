@@ -47,7 +47,7 @@ def distinct(names: Sequence[str]) -> list[str]:
     A name that is such a word stays; Greek letters are spelled out; other characters become _, and its place follows
     where two names would become one.
     """
-    words = [_word(name) for name in names]
+    words = ["".join([_letters(character) for character in unicodedata.normalize("NFKC", name)]) for name in names]
     taken = {name for name, word in zip(names, words, strict=True) if word == name}
     for i, name in enumerate(names):
         if words[i] != name:
@@ -57,10 +57,6 @@ def distinct(names: Sequence[str]) -> list[str]:
                 words[i] += "_"
             taken.add(words[i])
     return words
-
-
-def _word(name: str) -> str:
-    return "".join([_letters(character) for character in unicodedata.normalize("NFKC", name)])
 
 
 def _letters(character: str) -> str:

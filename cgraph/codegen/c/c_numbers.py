@@ -68,10 +68,6 @@ class CNumbers:
             )
         return self.adapted(row.c)
 
-    def helper(self, op: Row) -> str:
-        """C function that the operation calls, or nothing."""
-        return self.adapted(columns(op).c_helper)
-
     def adapted(self, text: str) -> str:
         """A text of doubles in these numbers."""
         if self.type == "double":
