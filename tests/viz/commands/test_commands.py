@@ -14,7 +14,7 @@ from tests.each_row import each_row
 from viz import cli, theme
 from viz.commands.points import filled
 
-RIGHT, FLAWED = ("chain_rule", "chain_rule_literal"), ("by_definition", "kinetic_only", "kinetic_only_exact")
+EMBEDDED = ("by_definition", "kinetic_only", "kinetic_only_exact")
 MODEL = """<mujoco><compiler angle="radian"/><worldbody>
 <body name="a"><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1" contype="0"/>
 <body name="b"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.5" contype="0"/></body></body>
@@ -34,16 +34,7 @@ def by_complex_step(graph: cg.Graph, output: str, name: str, at: dict[str, float
     return values[graph.outputs[output]].imag / 1e-200
 
 
-@each_row("formulation", RIGHT)
-def test_lint_proves_that_the_chain_rule_keeps_q_and_qd_apart(said, formulation):
-    text = said("lint", "triple_pendulum", "--formulation", formulation)
-    assert text.count("Holds: ") == 2
-    told = "the torque is right: every derivative in it is taken at independent q and qd."
-    assert text.partition("\n")[0].endswith(told)
-    assert "q.joint 1, q.joint 2 and q.joint 3 are inputs" in text
-
-
-@each_row("formulation", FLAWED)
+@each_row("formulation", EMBEDDED)
 def test_lint_blames_the_edges_of_the_embedding(figures, formulation):
     exact = formulation == "kinetic_only_exact"  # embedded, but no derivative is taken through it
     found = figures("lint", "triple_pendulum", "--formulation", formulation, status=int(not exact))
