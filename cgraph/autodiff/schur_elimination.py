@@ -12,8 +12,7 @@ second-order adjoint W and the right-hand side b, an operation z with partials p
 and a variable w, once all nodes that use it have left, by Gaussian elimination.
 """
 
-from __future__ import annotations
-
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -247,10 +246,7 @@ def _variable_sums(order: Sequence[Node], position: Mapping[Node, int]) -> dict[
 
     order: nodes, arguments first.  position: {variable: its place among all}.
     """
-    uses: dict[Node, int] = {}
-    for node in order:
-        for arg in node.args:
-            uses[arg] = uses.get(arg, 0) + 1
+    uses = Counter([arg for node in order for arg in node.args])
     sums = {}
     for node in order:
         if node.op.name in ("add", "sub"):

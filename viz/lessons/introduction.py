@@ -1,7 +1,5 @@
 """Introduction of a lesson: the system, its numbers with units, the notation, and what Lagrange's equation asks."""
 
-from __future__ import annotations
-
 from html import escape
 from math import cos, sin
 

@@ -1,7 +1,5 @@
 """The page of run time beside error: plots, tables and words from the plain data of a report."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from .. import theme

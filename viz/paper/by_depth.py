@@ -1,7 +1,5 @@
 """Figure 7, of our own: both forms of the equations of motion by depth, and what the paper expects of the second."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 from cgraph import Counts, Graph

@@ -1,7 +1,5 @@
 """Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cgraph._shared import Array, Json

@@ -1,7 +1,5 @@
 """Names in C: of a function, checked; of places in its arrays, made from the names of inputs and outputs."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re
@@ -32,13 +30,9 @@ def check_function_name(name: str) -> None:
         raise ValueError(f"the name of a C function must be a letter, then letters, digits and _, got {name!r:.60}")
     if len(name) > LONGEST_NAME:
         raise ValueError(f"the name of a C function may have {LONGEST_NAME} characters, got {len(name)}: {name:.60}")
-    if name in _TAKEN or _MACROS.fullmatch(name) or _is_in_the_library(name):
+    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)  # the program would take its name in silence
+    if name in _TAKEN or _MACROS.fullmatch(name) or hasattr(library, name):
         raise ValueError(f"the name of a C function must not be a word of C, C++ or their library, got {name!r}")
-
-
-def _is_in_the_library(name: str) -> bool:
-    """Whether the C library of this system has the name, which the program would take from it in silence."""
-    return hasattr(ctypes.CDLL("ucrtbase" if os.name == "nt" else None), name)
 
 
 def distinct(names: Sequence[str]) -> list[str]:

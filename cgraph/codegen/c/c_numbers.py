@@ -1,7 +1,5 @@
 """Numbers of a C program, double or float: their texts, and the texts of operations on them."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

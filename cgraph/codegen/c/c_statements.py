@@ -1,7 +1,5 @@
 """The body in C: the functions of a graph's statements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from ...core.node import VARIABLE, Node

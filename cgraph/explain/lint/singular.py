@@ -1,7 +1,5 @@
 """Singular nodes: operations whose slope is unbounded, or that have no value, somewhere in a box of inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from ...core.evaluation import box_interval

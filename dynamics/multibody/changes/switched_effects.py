@@ -1,7 +1,5 @@
 """Gravity, damping, springs, armature and forces switched off in a model, or put in where they are absent."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Any

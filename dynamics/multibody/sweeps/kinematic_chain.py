@@ -1,7 +1,5 @@
 """Kinematic chains: where points and directions of a body are, in the world or on a body inwards, and how they move."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

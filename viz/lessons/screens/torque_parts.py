@@ -1,7 +1,5 @@
 """Parts of a torque: what of it vanishes with q̈, what with q̇, and what remains at rest."""
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Orbits: Kepler's problem with large eccentricity over many turns."""
 
-from __future__ import annotations
-
 import math
 
 import cgraph as cg
