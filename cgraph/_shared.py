@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     )
     from .util.threads import share as share, thread_count as thread_count
     from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
-    from .writing.formulas import Side as Side, fraction as fraction, statements as statements
+    from .writing.formulas import Side as Side, entries_of as entries_of, fraction as fraction, statements as statements
     from .writing.holds_nodes import HoldsNodes as HoldsNodes
     from .writing.latex import LATEX as LATEX, latex_block as latex_block, number_text as number_text
     from .writing.naming import Remarks as Remarks, remarked as remarked, remarks_of as remarks_of

@@ -1,7 +1,5 @@
 """Looks of everything: colors that color-blind people can tell apart, fonts, and names in mathematical letters."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -152,7 +152,8 @@ class BalancedElimination(EdgePushing):
         for node, terms in self.sums.items():
             place[terms.variable] = place[node]
         later = [{place[node] for node in row if place[node] > k} for k, row in enumerate(rows)]
-        pieces = dissect(later, [self._is_variable(step) for step in plan], [len(nodes_of(step)) for step in plan])
+        variables = [not isinstance(step, list) and (step in self.sums or step in self.position) for step in plan]
+        pieces = dissect(later, variables, [len(nodes_of(step)) for step in plan])
         self._piece = {node: pieces[k] for node, k in place.items()}
         self._copies: dict[Node, Copy] = {}
         self._leaving: dict[int, list[Node]] = {}  # the nodes whose copies leave after the step at a place
@@ -166,9 +167,6 @@ class BalancedElimination(EdgePushing):
     def is_cut(self) -> bool:
         """Whether there is more than one piece."""
         return bool(self._copies)
-
-    def _is_variable(self, step: EliminationStep) -> bool:
-        return not isinstance(step, list) and (step in self.sums or step in self.position)
 
     def _cut(self, plan: Sequence[EliminationStep], rows: Sequence[Collection[Node]], pieces: Sequence[Piece]) -> None:
         """Copies of the nodes that steps of other pieces pass to, and where they leave."""

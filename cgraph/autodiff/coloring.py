@@ -7,8 +7,6 @@ row: time is proportional to the number of entries, where the graph of columns t
 graph algorithms would color, has a number of edges that grows with the squares of the rows.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import operator

@@ -1,7 +1,5 @@
 """The entries of a sparse Jacobian written out, a sweep for each row or for each column over what it reaches alone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ..core.builder import Builder

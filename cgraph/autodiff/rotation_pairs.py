@@ -3,9 +3,8 @@
 These are operations, or constants with c^2 + s^2 = 1.
 """
 
-from __future__ import annotations
-
 import math
+from collections import Counter
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
@@ -52,10 +51,7 @@ def rotations(order: Sequence[Node], depends: Collection[Node], kept: Collection
 
     order: nodes, arguments first. The products c x, .. of a rotation have no other use among them, and are not `kept`.
     """
-    uses = dict.fromkeys(kept, 1)
-    for node in order:
-        for arg in node.args:
-            uses[arg] = uses.get(arg, 0) + 1
+    uses = Counter([*kept, *[arg for node in order for arg in node.args]])
     unpaired: dict[tuple[Node, Node, Node], _Sum] = {}
     unpaired_constants: dict[frozenset[Node], _Sum] = {}
     pairs = []

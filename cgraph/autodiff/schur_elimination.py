@@ -12,8 +12,7 @@ second-order adjoint W and the right-hand side b, an operation z with partials p
 and a variable w, once all nodes that use it have left, by Gaussian elimination.
 """
 
-from __future__ import annotations
-
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -114,7 +113,7 @@ class EdgePushing(SymmetricElimination):
                 dots[variable] = p * rest
         else:  # t_z = sum_k p_k t_k
             terms = [self.product(step, p, dots[self.unknown(arg)]) for arg, p in self.partials[step].items()]
-            dots[step] = _total(terms)
+            dots[step] = sum(terms[1:], start=terms[0])
 
     def finish(self) -> None:
         """Take out the unknowns that wait, and give them their tangents."""
@@ -233,13 +232,6 @@ class EdgePushing(SymmetricElimination):
                 self.matrix.add(self.unknown(a), self.unknown(b), 2.0 * term if a is b and j != k else term)
 
 
-def _total(terms: list[Node]) -> Node:
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
-    return total
-
-
 class _VariableSum(NamedTuple):
     """The terms of z = p variable + p_other other, where z can be eliminated in place of the variable; p is 1 or -1."""
 
@@ -254,10 +246,7 @@ def _variable_sums(order: Sequence[Node], position: Mapping[Node, int]) -> dict[
 
     order: nodes, arguments first.  position: {variable: its place among all}.
     """
-    uses: dict[Node, int] = {}
-    for node in order:
-        for arg in node.args:
-            uses[arg] = uses.get(arg, 0) + 1
+    uses = Counter([arg for node in order for arg in node.args])
     sums = {}
     for node in order:
         if node.op.name in ("add", "sub"):

@@ -1,7 +1,5 @@
 """A sparse symmetric matrix of nodes, its rows and columns named by nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from ..core.node import Node, as_node

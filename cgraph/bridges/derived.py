@@ -1,7 +1,5 @@
 """Derivatives of a compiled graph as further compiled graphs, to any order."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from ..core.evaluation import Array

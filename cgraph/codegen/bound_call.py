@@ -3,8 +3,6 @@
 A call through ctypes converts every argument every time, which takes longer than the equations of a small robot.
 """
 
-from __future__ import annotations
-
 import ctypes
 import struct
 import sys

@@ -1,7 +1,5 @@
 """Entries of C: machine code of a graph as functions of the kinds that other software calls by their address."""
 
-from __future__ import annotations
-
 import ctypes
 from typing import Any, NamedTuple
 

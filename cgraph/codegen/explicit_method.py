@@ -1,7 +1,5 @@
 """Explicit Runge-Kutta methods, as generated code takes them: their numbers, and what is checked of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 

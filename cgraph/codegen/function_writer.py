@@ -1,7 +1,5 @@
 """FunctionWriter: LLVM's text of a function with loops, over numbers or over vectors of a number for each lane."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 

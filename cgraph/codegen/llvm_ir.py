@@ -159,13 +159,22 @@ def instructions(
             return r, [*address("x", f"{r}.x", rows[node]), one, *arithmetic.splat(r, f"{r}.one")]
         return r, [*address("x", f"{r}.x", rows[node]), f"  {r} = load {t}, ptr {r}.x, align 8"]
 
-    outputs, ends = _places_of_outputs(graph, last)
+    outputs: dict[Node, list[int]] = {}
+    for row, node in enumerate(graph.outputs.values()):
+        if row not in last:
+            outputs.setdefault(node, []).append(row)
+    ends = {row: node for row, node in enumerate(graph.outputs.values()) if row in last}
 
     def store(places: Iterable[int], r: str) -> Iterator[str]:
         for row in places:
             yield from [*address("y", f"%y{row}", row), f"  store {t} {r}, ptr %y{row}, align 8"]
 
-    merged = _merged(graph, arithmetic, products)
+    if not arithmetic.fuses:
+        products = {}
+    elif products is None:
+        products = products_of(graph)
+    sums = vector_sums(graph, products) if arithmetic.lanes == 1 else {}  # of one point
+    merged = Merged(_joined_calls(graph, arithmetic), products, _of_libm(graph, arithmetic), sums)
     vectors = Vectors(merged.sums)
     steps = _results_behind_calls(schedule(graph, merged), merged.calls)
     steps = {step: () if isinstance(step, Sums) else reads for step, reads in steps.items() if step not in merged.sums}
@@ -197,25 +206,6 @@ def instructions(
         written[-1] += [*lines, *store([row], r)]
     written[-1] += _last_stores(ends, parts, store)
     return Code(written, constants.start(), parts.places, constants.definitions())
-
-
-def _places_of_outputs(graph: Graph, last: Collection[int]) -> tuple[dict[Node, list[int]], dict[int, Node]]:
-    """Rows of outputs, {node: its rows}, and {row: node} of those that are stored at the end."""
-    outputs: dict[Node, list[int]] = {}
-    ends: dict[int, Node] = {}
-    for row, node in enumerate(graph.outputs.values()):
-        if row in last:
-            ends[row] = node
-        else:
-            outputs.setdefault(node, []).append(row)
-    return outputs, ends
-
-
-def _merged(graph: Graph, arithmetic: Arithmetic, products: Mapping[Node, Node] | None) -> Merged:
-    """Arithmetic joined into one step; sums side by side of one point, whose products are not rounded."""
-    products = (products_of(graph) if products is None else products) if arithmetic.fuses else {}
-    sums = vector_sums(graph, products) if arithmetic.lanes == 1 else {}
-    return Merged(_joined_calls(graph, arithmetic), products, _of_libm(graph, arithmetic), sums)
 
 
 def _last_stores(

@@ -5,8 +5,6 @@ few thousand steps, minutes at ten thousand. So a function has some hundred step
 the processor has registers: others wait in memory, those that are needed last (Belady 1966; the fewest loads).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 

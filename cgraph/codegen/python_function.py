@@ -122,5 +122,5 @@ def _names(graph: Graph, helpers: Iterable[str]) -> dict[Node, str]:
 
 
 def _number(value: float) -> str:
-    text = {"inf": "inf", "-inf": "-inf"}.get(repr(value), repr(value))
+    text = repr(value)
     return f"({text})" if text.startswith("-") else text

@@ -1,7 +1,5 @@
 """The order in which machine code computes a graph's nodes, and the calls of functions that it makes as one."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Set
 from types import MappingProxyType

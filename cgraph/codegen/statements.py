@@ -1,7 +1,5 @@
 """Statements of C or JavaScript, one for each operation, in one function or, for long graphs, in several."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 

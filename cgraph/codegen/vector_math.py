@@ -6,8 +6,6 @@ positive) have their value from libm, so that none depends on its neighbours. Ot
 equations of motion take sines and cosines of joint angles and hardly anything else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 from .arithmetic import Arithmetic

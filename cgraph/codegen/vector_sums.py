@@ -4,8 +4,6 @@ Of a straight line of code for one point, where factors are used again and again
 solution are. Every sum is added up in the order in which it is written, so that its bits are the same.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter

@@ -1,7 +1,5 @@
 """The row of an operation: what a node, evaluation and both modes of differentiation know of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

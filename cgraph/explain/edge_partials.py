@@ -1,7 +1,5 @@
 """Numbers at a point: the value of every node, and the local partial derivative of every edge."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from ..core.checks import GraphError

@@ -1,7 +1,5 @@
 """Paths through a graph: their number and the k best, by one sweep over the nodes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Sequence
 from operator import itemgetter

@@ -1,7 +1,5 @@
 """Reachability: the descendants and the ancestors of nodes, and what lies between two groups."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Sequence
 
 from ..core.node import Node

@@ -115,7 +115,8 @@ class Why:
         """Sentences before and after the list of paths."""
         if not self.count:
             return [f"{self.output} does not depend on {self.input}; cg.why_not tells where it stops."], []
-        said = [f"{self.output} depends on {self.input} along {count_text(self.count)}."]
+        paths = counted(self.count, "path") if self.count <= EXACT else f"{digits_of(self.count)} paths"
+        said = [f"{self.output} depends on {self.input} along {paths}."]
         if self.derivative is not None:
             said.append(f"d {self.output} / d {self.input} = {self.derivative:.6g}, the sum over all of them.")
             return said, [self._balance()]
@@ -318,11 +319,6 @@ def digits_of(count: int) -> str:
     log = math.log10(count >> shift) + shift * math.log10(2.0)
     mantissa = 10.0 ** (log % 1.0)
     return f"{mantissa:.3g}e+{math.floor(log)}"
-
-
-def count_text(count: int) -> str:
-    """`1 path`, `12 paths`, `3.21e+41 paths`."""
-    return counted(count, "path") if count <= EXACT else f"{digits_of(count)} paths"
 
 
 def _weight(path: Path) -> str:

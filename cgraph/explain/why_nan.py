@@ -90,7 +90,8 @@ class WhyNan:
         lines.append(f"It begins with {of}{self.line}{by}, which is {self.result}, where {_pairs(values)}.")
         if self.inputs not in (self.arguments, self.at):
             lines.append(f"That depends on {_pairs(self.inputs) or 'no input'}.")
-        return [*lines, f"On its way: {' -> '.join(_short(self.way))}."] if len(self.way) > 1 else lines
+        way = self.way if len(self.way) <= SHOWN else [*self.way[: SHOWN - 2], "..", self.way[-1]]
+        return [*lines, f"On its way: {' -> '.join(way)}."] if len(way) > 1 else lines
 
     def to_dict(self) -> dict[str, Json]:
         """Dictionary for JSON; the node is numbered as in `graph.nodes`, its number in the listing is in `line`."""
@@ -282,7 +283,3 @@ def _told(names: Names, node: Node) -> str:
 
 def _pairs(numbers: Mapping[str, float]) -> str:
     return joined([f"{name} = {value:g}" for name, value in numbers.items()], SHOWN)
-
-
-def _short(way: Sequence[str]) -> list[str]:
-    return list(way) if len(way) <= SHOWN else [*way[: SHOWN - 2], "..", way[-1]]

@@ -199,12 +199,8 @@ def atan2(y: Interval, x: Interval) -> Interval:
     if y[0] <= 0.0 <= y[1] and x[0] <= 0.0:  # the origin, or the half line along which the angle jumps
         return _down(-math.pi), _up(math.pi)
     corners = [math.atan2(v, u) for v in y for u in x]
-    return _outwards(min(corners), max(corners))
-
-
-def _outwards(low: float, high: float) -> Interval:
-    """Bounds rounded outwards, where zero is known to be exact."""
-    return (low if low == 0.0 else _down(low, ULPS)), (high if high == 0.0 else _up(high, ULPS))
+    low, high = min(corners), max(corners)
+    return (low if low == 0.0 else _down(low, ULPS)), (high if high == 0.0 else _up(high, ULPS))  # zero is exact
 
 
 def pow(a: Interval, b: Interval) -> Interval:
@@ -236,11 +232,7 @@ def where(c: Interval, a: Interval, b: Interval) -> Interval:
     """Bounds of the part that the condition can choose."""
     if c == (0.0, 0.0):
         return b
-    return a if c[0] > 0.0 or c[1] < 0.0 else _hull(a, b)
-
-
-def _hull(a: Interval, b: Interval) -> Interval:
-    return min(a[0], b[0]), max(a[1], b[1])
+    return a if c[0] > 0.0 or c[1] < 0.0 else (min(a[0], b[0]), max(a[1], b[1]))
 
 
 def minimum(a: Interval, b: Interval) -> Interval:

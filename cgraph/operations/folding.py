@@ -4,8 +4,6 @@ Rules see the arguments of the node to be, not all constant, and give a node tha
 every operand for finite and a divisor for non-zero: 0 * x = 0, x - x = 0. Zeros have no sign: x + 0 = x.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

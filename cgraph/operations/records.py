@@ -1,7 +1,5 @@
 """Records: a graph as flat rows of plain data, which pickle reads and writes without recursion."""
 
-from __future__ import annotations
-
 import copyreg
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any

@@ -7,8 +7,6 @@ coefficients are nodes, and through these graphs numbers of every kind. Sums and
 rule, piecewise operations their `piece`; every other operation without a rule of its own has `by_partials`.
 """
 
-from __future__ import annotations
-
 import operator
 from typing import Protocol
 

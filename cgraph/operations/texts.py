@@ -4,8 +4,6 @@ LLVM: {r} result, {0} {1} {2} arguments, {t} type, {b} type of a comparison, {f}
 {zero} {one} {minus} constants, {call} the row's function of the C library. C: {name} the function being written.
 """
 
-from __future__ import annotations
-
 LLVM_SIGN = (
     "{r}.above = fcmp ogt {t} {0}, {zero}",
     "{r}.below = fcmp olt {t} {0}, {zero}",

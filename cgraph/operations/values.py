@@ -1,7 +1,5 @@
 """Value of operations on floats and on arrays, where Python's or NumPy's own are not IEEE's."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import wraps

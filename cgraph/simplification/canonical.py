@@ -7,8 +7,6 @@ two sums those without such atoms stay together: written out they would gain not
 counts as zero where it is no more than rounding of the terms that it came from.
 """
 
-from __future__ import annotations
-
 import cmath
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
@@ -93,7 +91,7 @@ class Canonical:
                 return self.product(*(args if min(map(len, args)) <= 1 else map(self._factor, node.args)))
             case "div":
                 return self.product(self._factor(node.args[0]), self._inverse(node.args[1]))
-            case "pow" if _small_whole(node.args[1].value):
+            case "pow" if (p := node.args[1].value) is not None and abs(p) <= MOST_POWER and p == int(p):
                 return self._power(node)
             case "sqrt":
                 return self._ruled(self._function(node), args[0])
@@ -285,7 +283,3 @@ def without_zeros(a: Sum) -> Sum:
 def key(a: Sum) -> frozenset[tuple[Powers, complex]]:
     """Key that equal sums share."""
     return frozenset([(powers, term.value) for powers, term in a.items()])
-
-
-def _small_whole(value: float | None) -> bool:
-    return value is not None and abs(value) <= MOST_POWER and value == int(value)

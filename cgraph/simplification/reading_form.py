@@ -8,6 +8,7 @@ common factors taken out: (m + M) l^2 theta_dot^2 / 2 - m g l cos(theta).
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..core.node import CONSTANT, Node
@@ -71,10 +72,7 @@ class _Reader(OrderedTerms):
         """The nodes, sums and products in order, else as they stand; what is shared stays shared."""
         order = topological(nodes)
         ends = set(nodes)
-        uses: dict[Node, int] = dict.fromkeys(nodes, 1)
-        for node in order:
-            for arg in node.args:
-                uses[arg] = uses.get(arg, 0) + 1
+        uses = Counter([*ends, *[arg for node in order for arg in node.args]])
         size = inks(order)
         alone = {node for node in order if (uses[node] == 1 or size[node] <= SHORT) and not node.name}
         sums: dict[Node, list[Signed]] = {}  # the terms of each node

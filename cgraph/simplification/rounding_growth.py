@@ -23,21 +23,15 @@ def as_accurate(old: Node, new: Node) -> bool:
     At points near 0, near 1, anywhere, and where all variables are large and alike, so that their differences cancel.
     """
     names = sorted({node.name or "" for node in topological([old, new]) if not node.args and node.op is not CONSTANT})
-    points = dict(zip(names, _points(len(names)), strict=True))
+    noise = np.random.default_rng(len(names)).normal(size=(4, len(names), 6))
+    regimes = noise[0], 1e-3 * noise[1], np.exp(0.3 * noise[2]), 1e3 * (1.0 + 1e-3 * noise[3])
+    points = dict(zip(names, np.concatenate(regimes, axis=1), strict=True))
     (values, errors), (_, others) = (error_bounds(topological([node]), points) for node in (old, new))
     value, before, after = values[old], errors[old], others[new]
     with np.errstate(all="ignore"):
         usable = np.isfinite(value) & np.isfinite(before)
         worse = ~(after <= MORE_ERROR * np.maximum(before, ERROR_UNIT * np.abs(value)))  # what is not finite is worse
     return not np.any(usable & worse)
-
-
-def _points(count: int) -> Array:
-    """Samples of so many variables, (count, points)."""
-    rng = np.random.default_rng(count)
-    noise = rng.normal(size=(4, count, 6))
-    regimes = noise[0], 1e-3 * noise[1], np.exp(0.3 * noise[2]), 1e3 * (1.0 + 1e-3 * noise[3])
-    return np.concatenate(regimes, axis=1)
 
 
 def error_bounds(

@@ -1,7 +1,5 @@
 """A sentence for what Python says when it stumbles over a wrong argument, looked for once a call has failed."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import is_dataclass

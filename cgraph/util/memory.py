@@ -1,7 +1,5 @@
 """Arrays that machine code uses as they lie: checked."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.checks import GraphError

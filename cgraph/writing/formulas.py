@@ -116,12 +116,7 @@ class Formulas:
 
     def lines(self, ends: Sequence[Node], most: int = LINES) -> Lines:
         """The lines of the ends and of what they need, those nearest to the ends where there are too many."""
-        needed = dict.fromkeys(ends)
-        queue = list(needed)
-        for node in queue:  # breadth first
-            new = [arg for arg in self._inside(node)[1:] if arg in self.lined and arg not in needed]
-            needed |= dict.fromkeys(new)
-            queue += new
+        queue = list(dict.fromkeys([*ends, *self._needed(ends)]))
         most = require_whole("lines", most, 1)
         kept = sorted(queue[:most], key=self.places.__getitem__)
         named: dict[Node, list[str]] = {}
@@ -235,7 +230,7 @@ def statements(
     >>> statements([(p, v + w)], LATEX).equations
     [('p', 'v + w')]
     """
-    ends = [entry for sides in given for entry in _entries(sides)]
+    ends = [entry for sides in given for entry in entries_of(sides)]
     found = Formulas(topological(ends), {}, notation, called, reading=True)
     kept, needed, all_needed = _fitting(given, found, require_whole("lines", lines, 1), whole)
     equations = [row for node in needed for row in found._rows(found.symbol[node], node)]
@@ -264,18 +259,18 @@ def _fitting(
     shown: set[Node] = set()
     everything: set[Node] = set()
     for sides in given:
-        needed = set(found._needed(_entries(sides)))
+        needed = set(found._needed(entries_of(sides)))
         everything |= needed
         if len(shown | needed) + len(kept) < most:
             kept.append(sides)
             shown |= needed
     if not kept and given and not whole:
         kept = [given[0]]
-        shown = set(found._needed(_entries(given[0]))[: most - 1])
+        shown = set(found._needed(entries_of(given[0]))[: most - 1])
     return kept, sorted(shown, key=place), sorted(everything, key=place)
 
 
-def _entries(sides: Sequence[Side]) -> list[Node]:
+def entries_of(sides: Sequence[Side]) -> list[Node]:
     """All nodes of a statement."""
     return [entry for side in sides for row in ([[side]] if isinstance(side, Node) else side) for entry in row]
 

@@ -127,7 +127,12 @@ def from_networkx(network: networkx.DiGraph) -> Graph:
         arity = OPS[op].arity if op in OPS else 0
         if sorted(slots) != list(range(arity)) or network.in_degree(key) != arity:
             raise GraphError(f"node {key!r}, {op}, takes {arity} arguments in slots from 0, got {sorted(slots)}")
-        labels = tuple([tuple([_member(each) for each in read(label, json.loads, ())]) for label in LABELS])
+        labels = tuple(
+            [  # a source line is a list in JSON
+                tuple([SourceLine(*each) if isinstance(each, list) else each for each in read(label, json.loads, ())])
+                for label in LABELS
+            ]
+        )
         kept.append((op, tuple([slots[slot] for slot in range(arity)]), value, name, labels))
         outputs |= {place: (output, number[key]) for output, place in read("outputs", json.loads, {}).items()}
     given = tuple([inputs[place] for place in sorted(inputs)])
@@ -148,11 +153,6 @@ def _read(key: object, data: Mapping[str, Any], name: str, kind: Callable[[Any],
 
 def _name(name: str) -> str:
     return check_name("a node", name)
-
-
-def _member(member: object) -> object:
-    """A tag, a role or a source line as JSON has it."""
-    return SourceLine(*member) if isinstance(member, list) else member
 
 
 def _text(value: object) -> str:

@@ -1,7 +1,5 @@
 """Lagrange's equation as forces on the velocity nodes of L: at qdd = 0 the bias, at others inverse dynamics."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

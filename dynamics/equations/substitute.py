@@ -1,7 +1,5 @@
 """Substitution: copies of nodes with other nodes in place of their variables."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from cgraph import Node

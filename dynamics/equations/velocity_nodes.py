@@ -18,8 +18,6 @@ What cancels is never built. The velocities qd are velocity nodes themselves (f 
 worst with z = qd, where (C) is Lagrange's equation as it stands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from cgraph import Node

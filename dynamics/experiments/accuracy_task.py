@@ -149,9 +149,9 @@ class StabilityCase(AccuracyTask):
             object.__setattr__(self, "criteria", (*self.criteria, error_criterion(self.growth)))
 
 
-def error_criterion(growth: float, why: str = GROWN, quantity: str = "error") -> Criterion:
+def error_criterion(growth: float, why: str = GROWN) -> Criterion:
     """The bound of a well-behaved method: local errors of RTOL, grown as the flow grows them."""
-    return Criterion(quantity, SLACK * RTOL * max(growth, 1.0), why)
+    return Criterion("error", SLACK * RTOL * max(growth, 1.0), why)
 
 
 def energy_criterion(scale: float, why: str = "nothing takes energy in or out") -> Criterion:

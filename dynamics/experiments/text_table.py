@@ -1,7 +1,5 @@
 """Figures as text: tables for a terminal, CSV, and numbers of two digits."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Timing: the clocks, runs in turns, and the machine that times belong to."""
 
-from __future__ import annotations
-
 import gc
 import math
 import os

@@ -1,7 +1,5 @@
 """Contacts of a robot file: spheres and ends of capsules on planes and spheres, of a material that its weight gives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias

@@ -1,7 +1,5 @@
 """Elements of a file that a mechanism has not: refused, or left out and said; and loops that follow from others."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 

@@ -27,12 +27,6 @@ def joint_order(mj: MjModel, mechanism: Mechanism) -> tuple[list[int], list[int]
     return q, u
 
 
-def _tree(mechanism: Mechanism) -> Mechanism:
-    """The tree of the bodies that move, those welded to them merged in, without loops and limits."""
-    bodies = [replace(body, joint=replace(body.joint, limits=None)) for body in mechanism.moving]
-    return replace(mechanism, bodies=bodies, locked={}, loops=())
-
-
 class MujocoTwin:
     """MuJoCo's model of a mechanism, asked for the quantities that the graphs give.
 
@@ -43,7 +37,10 @@ class MujocoTwin:
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
         self.mechanism = require_mechanism(of, "MuJoCo").bind()
-        self.model = mujoco_spec(_tree(self.mechanism), timestep).compile()
+        bodies = [
+            replace(body, joint=replace(body.joint, limits=None)) for body in self.mechanism.moving
+        ]  # welds merged
+        self.model = mujoco_spec(replace(self.mechanism, bodies=bodies, locked={}, loops=()), timestep).compile()
         self.data = self.mujoco.MjData(self.model)
 
     def require_tree(self, what: str) -> None:

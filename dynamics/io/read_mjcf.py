@@ -202,7 +202,9 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     limits = [j for j in sorted(_where(mj, "jnt_limited")) if smooth.limits is None or not single(mj, j)]
     touching = (np.any(mj.geom_contype) and np.any(mj.geom_conaffinity)) or mj.npair
     rubbing = not disabled(mj, "CONSTRAINT", "FRICTIONLOSS")
-    losses = [f"{_coordinate(mj, i)}: {mj.dof_frictionloss[i]:g}" for i in sorted(_where(mj, "dof_frictionloss"))]
+    rubbed = sorted(_where(mj, "dof_frictionloss"))
+    names = _joint_names(mj, [int(mj.dof_jntid[i]) for i in rubbed])
+    losses = [f"{name}: {mj.dof_frictionloss[i]:g}" for name, i in zip(names, rubbed, strict=True)]
     left = [i for i in range(actuators(mj)) if not (smooth.actuators and modelled(mj, i))]
     acting = {} if disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in left}
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
@@ -264,11 +266,6 @@ def _joint_names(mj: MjModel, joints: Sequence[int]) -> list[str]:
     return [mj.joint(j).name or f"of body {bodies[mj.jnt_bodyid[j]]!r}" for j in joints]
 
 
-def _coordinate(mj: MjModel, dof: int) -> str:
-    """The name of the joint of a degree of freedom."""
-    return _joint_names(mj, [int(mj.dof_jntid[dof])])[0]
-
-
 COPIES = 10_000  # of replicated elements: MuJoCo's time grows with their square
 _FILES = {f"file{side}" for side in ("", "right", "left", "up", "down", "front", "back")}
 
@@ -310,7 +307,7 @@ class _Asked:
     def read(self, text: bytes) -> None:
         """Add what a text asks for. Raises what expat does, also where MuJoCo takes it, as "--" in a comment."""
         parser = expat.ParserCreate("utf-8" if self.folder is None else None)
-        parser.StartElementHandler, parser.EndElementHandler = self._opened, self._closed
+        parser.StartElementHandler, parser.EndElementHandler = self._opened, lambda _: self.within.pop()
         parser.Parse(text, True)
 
     def _opened(self, tag: str, attributes: dict[str, str]) -> None:
@@ -329,6 +326,3 @@ class _Asked:
                 with suppress(expat.ExpatError, LookupError):
                     self.read(path.read_bytes())
                 del self.within[depth:]
-
-    def _closed(self, tag: str) -> None:
-        self.within.pop()

@@ -1,7 +1,5 @@
 """URDF read: the mechanism of a <robot>, with the numbers of the file and the joints that mimic others."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """Sources of models: a path or XML text, read as bytes, and what errors call it."""
 
-from __future__ import annotations
-
 import os
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stand-ins for zero: the smallest mass and moment of inertia that MuJoCo takes, which are read as zero again."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

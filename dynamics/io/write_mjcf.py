@@ -12,7 +12,7 @@ import numpy as np
 from cgraph._shared import Array, real_number
 
 from ..multibody.algebra import spatial
-from ..multibody.bodies.limits import ANYTHING, NO_LIMITS, Pair
+from ..multibody.bodies.limits import ANYTHING, NO_LIMITS
 from ..multibody.loops import Loop
 from ..multibody.quantities.body_quantity import of_bodies
 from ..multibody.trees.mechanism import WORLD, Body, Mechanism, MechanismError, MechanismWarning, require_mechanism
@@ -136,14 +136,9 @@ def _joint(body: Body) -> dict[str, Any]:
         fields["stiffness"] = joint.stiffness
     limits = joint.limits or NO_LIMITS
     for field, ends in (("range", limits.position), ("actfrcrange", limits.effort)):
-        if _ranged(ends):
+        if ends != ANYTHING and ends[0] < ends[1]:  # by a range of no length MuJoCo means none
             fields[field] = ends
     return fields
-
-
-def _ranged(ends: Pair) -> bool:
-    """Whether MuJoCo takes a limit for one: by a range of which both ends are the same it means none."""
-    return ends != ANYTHING and ends[0] < ends[1]
 
 
 def _tell_left_out(bodies: Sequence[Body]) -> None:

@@ -17,7 +17,7 @@ from ..equations.constraints.nearly_redundant_rows import without_nearly_redunda
 from ..systems.constraints import Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple
-from .bodies.body import WORLD, Body, Joint, MechanismError, checked_name, checked_rotation, vector
+from .bodies.body import WORLD, Body, MechanismError, checked_name, checked_rotation, vector
 from .joints import COMPOSITIONS
 from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier
@@ -211,13 +211,13 @@ def _check_coupling(loop: Loop, where: str, bodies: Mapping[str, Body]) -> None:
     if not (listed and len(given) and all([is_finite(each) for each in given])):
         raise MechanismError(f"{where}: coefficients must be finite numbers, at least one, got {given!r:.60}")
     for name in (loop.body, loop.to):
-        constant = name == WORLD and len(given) == 1
-        if not constant and (name == WORLD or not _has_one_coordinate(bodies[name].joint)):
+        if name == WORLD:
+            fits = len(given) == 1  # a constant
+        else:
+            joint = bodies[name].joint
+            fits = joint.kind not in COMPOSITIONS and len(joint.type.coordinates) == 1
+        if not fits:
             raise MechanismError(f"{where}: a coupling needs joints with one coordinate, which {name!r} has not")
-
-
-def _has_one_coordinate(joint: Joint) -> bool:
-    return joint.kind not in COMPOSITIONS and len(joint.type.coordinates) == 1
 
 
 def _loop_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:

@@ -1,7 +1,5 @@
 """Parameters in place of numbers: what names and nodes stand for, and numbers put in for them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Graph values: a graph evaluated over decimal numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 

@@ -95,16 +95,18 @@ def reference(
     values = {name: bound[name] for name in (*inputs.parameters, *inputs.applied)}
     graph = state_equation(model)
 
-    def solve() -> Reference:
-        def run(wanted: int) -> tuple[list[list[Decimal]], str]:
-            return taylor(graph, inputs.states, x, times, values, wanted)
+    path = None if folder is None else folder / f"{key(graph, inputs.states, x, times, values, digits)}.json"
+    if path is not None and (kept := _read(path, times, len(x))) is not None:
+        return kept
 
-        return _converged(run, times, digits, inputs.states)
+    def run(wanted: int) -> tuple[list[list[Decimal]], str]:
+        return taylor(graph, inputs.states, x, times, values, wanted)
 
-    if folder is None:
-        return solve()
-    name = key(graph, inputs.states, x, times, values, digits)
-    return _kept(Path(folder) / f"{name}.json", times, len(x), solve)
+    solution = _converged(run, times, digits, inputs.states)
+    if path is not None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write(path, json.dumps(_signed(solution)))  # a reader sees all of it or nothing; several may write
+    return solution
 
 
 def _converged(
@@ -171,15 +173,6 @@ def key(
     numbers = [[float(value).hex() for value in row] for row in (start, times, values.values())]
     content = [FORMAT, nodes, rates, list(states), list(values), numbers, digits]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
-
-
-def _kept(path: Path, times: Sequence[float], width: int, solve: Callable[[], Reference]) -> Reference:
-    """The solution in a file, at these times with so many states; computed and kept when it is not there."""
-    if (found := _read(path, times, width)) is None:
-        found = solve()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        atomic_write(path, json.dumps(_signed(found)))  # a reader sees all of it or nothing; several may write
-    return found
 
 
 def _signed(solution: Reference) -> dict[str, object]:

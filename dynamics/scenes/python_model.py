@@ -1,7 +1,5 @@
 """Models of Python files and modules, by a name such as `arm.py:system` or `package.module:system`."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import os

@@ -1,7 +1,5 @@
 """Starts: a scene from a start that somebody chose by names, or from one that shows something where rest does not."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar

@@ -1,7 +1,5 @@
 """Arguments of systems: names, numbers, parameters and functions, checked."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import numbers

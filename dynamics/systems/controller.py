@@ -88,7 +88,7 @@ def controlled(
     if unused := [name for name in gains if name not in used]:
         known = or_nearest(unused[0], list(system.parameters))
         raise ValueError(f"neither the system nor the controller has a parameter {unused[0]!r}; of the system, {known}")
-    graph = Graph([*system.q, *system.qd, system.t, *p.values()], _numbered(forces))
+    graph = Graph([*system.q, *system.qd, system.t, *p.values()], {f"force{k}": node for k, node in enumerate(forces)})
     return _controlled(_Request(system, cg.structure_hash(graph), tuple(gains.items()), tuple(forces)))
 
 
@@ -102,7 +102,10 @@ class _Request:
 
 @memo(SYSTEMS_KEPT)
 def _controlled(request: _Request) -> Controlled:
-    return Controlled(_with_forces(request.system, request.forces, dict(request.gains)), request.forces)
+    system, forces = request.system, request.forces
+    pairs = zip(system.forces, forces, strict=True)
+    both = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
+    return Controlled(system.changed(parameters=system.parameters | dict(request.gains), forces=both), forces)
 
 
 def with_closed_form(model: Equations, tau: Any, parameters: object) -> tuple[Equations, Any, Sequence[Node] | None]:
@@ -116,14 +119,3 @@ def with_closed_form(model: Equations, tau: Any, parameters: object) -> tuple[Eq
     given = parameters if isinstance(parameters, Mapping) else {}
     closed = controlled(model, tau, {name: 0.0 for name in given if name not in model.parameters})
     return closed.system, 0.0, closed.forces
-
-
-def _numbered(forces: Sequence[Node]) -> dict[str, Node]:
-    return {f"force{k}": node for k, node in enumerate(forces)}
-
-
-def _with_forces(system: System, forces: Sequence[Node], parameters: Mapping[str, float]) -> System:
-    """The system with these forces besides its own, and these parameters."""
-    pairs = zip(system.forces, forces, strict=True)
-    both = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
-    return system.changed(parameters=system.parameters | dict(parameters), forces=both)

@@ -1,7 +1,5 @@
 """Kinematics: how the velocities of a system move its coordinates, and what that does to forces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from functools import cached_property
 

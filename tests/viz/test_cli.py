@@ -108,12 +108,10 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("draw a_file --out x.dot", "'a_file' is not XML, as MJCF and URDF are"),
         ("draw . --out x.dot", "'.' is a folder, and a model is a file"),
         ("draw chain --ignore --out x.dot", "scene 'chain' has no option 'ignore'"),
-        ("draw chain --limits 0,1 --out x.dot", "scene 'chain' has no option 'limits'"),
         ("draw spring_mass --out x.jpg", "must end in .svg, .png, .dot or .txt"),
         ("draw spring_mass --out missing/x.dot", "does not exist"),
         (["draw", "spring_mass", "--out", "x.dot", "--collapse", "link 9"], "link 9"),
         ("paper --out a_file", "cannot write into the folder a_file: a_file is a file"),
-        ("certify nowhere.xml", "there is no file 'nowhere.xml'"),
         ("why triple_pendulum tau0 q9", "nothing in the graph is called 'q9'"),
         (
             "why triple_pendulum tau9 q0",
@@ -143,6 +141,10 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("report spring_mass --pruning --quick", "--quick goes with a report of run times or --stability"),
         ("report --stability --ignore", "--ignore goes with a report of run times or --pruning"),
         ("report --stability --pruning", "one at a time"),
+        ("report chain --stability", "--stability takes no scene, got 'chain'"),
+        ("code spring_mass --js --out a.c", "--out must end in .mjs for --js, got a.c"),
+        ("code spring_mass --c --out 2.c", "must be a letter"),
+        ("code spring_mass --c --out sin.c", "sin.c names the function: the name of a C function must not be a word"),
         ("report --pruning", "--pruning needs a scene"),
         ("report chain --pruning --lock a=1 --lock a=2", "--lock takes each body once"),
     ],
@@ -202,6 +204,9 @@ draw chain --out a.dot --forward --formulation kinetic_only"""
             "report spring_mass --pruning --lock tip",
             "argument --lock: expected a body and a coordinate, BODY=AT, got 'tip'",
         ),
+        ("lint spring_mass --momentum --forward", "not allowed with argument"),
+        ("inspect spring_mass --momentum --forward --out a.html", "not allowed with argument"),
+        ("compare spring_mass --momentum --formulations chain_rule kinetic_only", "not allowed with argument"),
         ("report spring_mass --t-end inf", "argument --t-end: expected a finite number, got 'inf'"),
     ],
 )
@@ -399,25 +404,6 @@ def test_peers_that_are_not_installed_are_named_with_their_extra(without):
     assert arm.left_out == tuple(
         [f"{name} is not installed: in a checkout of cgraph, pip install -e '.[{of}]'" for name, of in extras.items()]
     )
-
-
-LATE = """import dynamics as dyn
-runaway = dyn.System(lambda q, qd, t, p: qd[0] ** 2 / 2 + q[0] ** 4, ["x"])  # at infinity before its time
-late = dyn.Scene("late", "it ends at infinity", runaway, (1.0,), (0.0,), 10.0)
-"""
-
-
-@pytest.mark.filterwarnings("always:the run stopped:dynamics.SimulationWarning")
-def test_a_motion_that_ends_before_its_time_is_a_finding_and_the_page_says_so(here, capsys):
-    page = here / "a.html"
-    (here / "own.py").write_text(LATE)
-    assert cli.main(["inspect", "own.py:late", "--out", str(page)]) == 1
-    said = capsys.readouterr().err
-    (line,) = [line for line in said.splitlines() if "stopped" in line]
-    sentence = f"The motion is not whole: it {line.removeprefix('cgraph: warning: the run ')}."
-    assert page.read_text(encoding="utf-8").count(json.dumps(sentence, ensure_ascii=False)[1:-1]) == 1
-    assert cli.main(["inspect", "spring_mass", "--t-end", "0.2", "--out", str(page)]) == 0
-    assert "not whole" not in page.read_text(encoding="utf-8")
 
 
 def test_the_stages_of_an_inspection_are_told_as_they_begin(tmp_path, capsys):

@@ -1,7 +1,5 @@
 """Spheres and planes of contacts as lines of a picture: rings with a mark, and lines, or grids seen from above."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -32,23 +32,10 @@ def add(parser: Command) -> None:
     takes_a_scene(parser)
     parser.names["tableaus"] = lambda: library.TABLEAUS
     language = parser.add_mutually_exclusive_group(required=True)
-    language.add_argument(
-        "--c",
-        dest="language",
-        action="store_const",
-        const="c",
-        help="C99, with its header; of the state equation with steps of {tableaus}",
-    )
-    language.add_argument(
-        "--js",
-        dest="language",
-        action="store_const",
-        const="js",
-        help="a module of JavaScript; of the state equation with steps of {tableaus}",
-    )
-    language.add_argument(
-        "--python", dest="language", action="store_const", const="python", help="a Python function of a list"
-    )
+    stepped = "; of the state equation with steps of {tableaus}"
+    languages = {"c": f"C99, with its header{stepped}", "js": f"a module of JavaScript{stepped}"}
+    for name, about in (languages | {"python": "a Python function of a list"}).items():
+        language.add_argument(f"--{name}", dest="language", action="store_const", const=name, help=about)
     parser.add_argument(
         "--what",
         choices=tuple(EQUATIONS),

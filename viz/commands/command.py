@@ -1,7 +1,5 @@
 """The table of the commands and their parsers, which have their arguments once a command is named."""
 
-from __future__ import annotations
-
 import argparse
 import difflib
 import sys

@@ -1,7 +1,5 @@
 """`cgraph completion`: what the Tab key completes, as a script for a shell, by shtab from the parser's arguments."""
 
-from __future__ import annotations
-
 import argparse
 
 import dynamics as dyn

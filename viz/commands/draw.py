@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import cgraph as cg
@@ -57,44 +56,25 @@ def run(options: argparse.Namespace) -> None:
         off = {name.replace("tau", "p") + "_dot": each for name, each in verdict.excess.items()} if verdict else {}
         verdict = verdict and replace(verdict, graph=graph, nodes=wrong.nodes, edges=wrong.edges, excess=off)
         what = what.replace("inverse dynamics", library.INERTIAL_TERM)
-    caption = f"{scene.name}: {what}"
     names = dyn.display_names(scene)
-    words = library.theme.MOTION_WORDS if options.momentum else {}
-    drawn = (graph, kind, options.collapse, caption, names, words, verdict)
-    content = _listed(graph, scene) if kind == ".txt" else _drawn(*drawn)
+    content: str | bytes
+    if kind == ".txt":  # the listing, and above it what a person calls inputs and outputs
+        called = [name for name in (*graph.input_names, *graph.outputs) if name in names]
+        content = "".join([f"# {name} is {names[name]}\n" for name in called]) + graph.listing()
+    else:
+        if options.collapse is None:
+            tags = collapsed(graph) if kind in PICTURES else []
+        else:
+            tags = [tag for each in options.collapse for tag in tags_of(each, graph)]
+        caption, legend = f"{scene.name}: {what}", library.theme.MOTION_WORDS if options.momentum else True
+        drawing = library.judged_drawing(graph, verdict, names=names, collapse=tags, caption=caption, legend=legend)
+        content = str(drawing.source) if kind == ".dot" else library.render_svg(drawing)
+        content = library.render_png(content) if kind == ".png" else content
     counts = graph.counts()
     answer(
         f"{options.out}: {_shared.counted(counts.nodes, 'node')}, {_shared.counted(counts.edges, 'edge')}",
         {options.out: content},
     )
-
-
-def _listed(graph: cg.Graph, scene: dyn.scenes.Scene) -> str:
-    """The listing, and above it what a person calls inputs and outputs."""
-    called = dyn.display_names(scene)
-    names = [name for name in (*graph.input_names, *graph.outputs) if name in called]
-    return "".join([f"# {name} is {called[name]}\n" for name in names]) + graph.listing()
-
-
-def _drawn(
-    graph: cg.Graph,
-    kind: str,
-    collapse: Sequence[str] | None,
-    caption: str,
-    names: Mapping[str, str],
-    words: Mapping[str, str],
-    verdict: dyn.Verdict | None,
-) -> str | bytes:
-    if collapse is None:
-        tags = collapsed(graph) if kind in PICTURES else []
-    else:
-        tags = [tag for each in collapse for tag in tags_of(each, graph)]
-    legend = words or True
-    drawing = library.judged_drawing(graph, verdict, names=names, collapse=tags, caption=caption, legend=legend)
-    if kind == ".dot":
-        return str(drawing.source)
-    svg = library.render_svg(drawing)
-    return library.render_png(svg) if kind == ".png" else svg
 
 
 def tags_of(text: str, graph: cg.Graph) -> list[str]:

@@ -1,7 +1,5 @@
 """`cgraph equations`: the Lagrangian, the momenta and the torques of a scene as formulas, in text or LaTeX."""
 
-from __future__ import annotations
-
 import argparse
 
 from . import library

@@ -1,7 +1,5 @@
 """`cgraph inspect`: one page on which the graphs of a scene's equations unfold, move and answer."""
 
-from __future__ import annotations
-
 import argparse
 
 from cgraph import _shared

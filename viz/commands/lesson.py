@@ -1,7 +1,5 @@
 """`cgraph lesson`: a lesson on a system, questions to predict and to try, with a worksheet and its key."""
 
-from __future__ import annotations
-
 import argparse
 from functools import partial
 from pathlib import Path

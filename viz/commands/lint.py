@@ -53,7 +53,10 @@ def run(options: argparse.Namespace) -> int:
     graph, what = equations_of(options, scene, verdict)
     at = None if options.at is None else filled(graph, scene, options.at)
     if verdict is not None and verdict.differs and options.at:
-        verdict = dyn.formulation_verdict(scene, options.formulation, _after(scene, at or {}))
+        given = at or {}
+        others = {name: x for name, x in given.items() if name != "dt" and not name.endswith("_old")}
+        after = library.after_step(scene.system, given) | others  # the state after the embedded step
+        verdict = dyn.formulation_verdict(scene, options.formulation, after)
     q, qd = state_names(graph, scene, momentum=options.momentum)
     report = cg.lint(
         graph,
@@ -93,12 +96,6 @@ def run(options: argparse.Namespace) -> int:
         caption=f"{scene.name}: {what}",
     )
     return 0 if ok else 1
-
-
-def _after(scene: dyn.scenes.Scene, at: dict[str, float]) -> dict[str, float]:
-    """The state after the embedded step, with the other inputs but dt."""
-    others = {name: value for name, value in at.items() if name != "dt" and not name.endswith("_old")}
-    return library.after_step(scene.system, at) | others
 
 
 def lint_text(report: _shared.Lint, verdict: dyn.Verdict | None) -> str:

@@ -1,7 +1,5 @@
 """`cgraph live`: one page on which a scene's motion is computed as it is watched."""
 
-from __future__ import annotations
-
 import argparse
 
 from . import library

@@ -1,7 +1,5 @@
 """`cgraph paper`: the paper's figures and its table, measured, in one folder."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`cgraph scenes`: the scenes, with the size of their graphs."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`cgraph type`: a page that a Lagrangian is typed into, and that derives, checks, draws and moves it offline."""
 
-from __future__ import annotations
-
 import argparse
 
 from . import library

@@ -1,7 +1,5 @@
 """Boxes and arrows of a drawing of a graph: a box for every node and output, an arrow for every edge."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

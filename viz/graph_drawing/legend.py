@@ -1,7 +1,5 @@
 """A legend as a picture, small, for drawings that share their colors, and ink for dark pages."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from html import escape
 

@@ -22,8 +22,6 @@ is wrong, off the names of the outputs in which it is, excess null or a graph of
 [{words, nodes, value, joint}]. Where nodes stand is the page's business, but for a `drawing`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 from cgraph import Graph, Node

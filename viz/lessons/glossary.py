@@ -1,7 +1,5 @@
 """Glossary of a lesson: its terms, links to them where they are first used, and what they mean at the end."""
 
-from __future__ import annotations
-
 import re
 from html import escape
 

@@ -1,7 +1,5 @@
 """Introduction of a lesson: the system, its numbers with units, the notation, and what Lagrange's equation asks."""
 
-from __future__ import annotations
-
 from html import escape
 from math import cos, sin
 
@@ -25,7 +23,7 @@ def introduction(subject: Subject) -> str:
     force = term("torque") if subject.force == "torque" else term("generalized force", subject.force)
     formula = equations(lagrangian_graph(subject.system), subject.names)
     meant = (
-        f"<p>{_sentence(subject.scene.about)}</p>"
+        f"<p>The system: {escape(subject.scene.about.rstrip('.'))}.</p>"
         f"<p>Names: <b>{name}</b> is a {term('coordinate')}, <b>{escape(subject.shown('qd0'))}</b> its "
         f"{term('velocity')} dq/dt, read “q dot”, and <b>{escape(subject.shown('qdd0'))}</b> its {term('acceleration')}, “q two dots”. "
         "Throughout the lesson the system is looked at in one moment, in which it moves:</p>"
@@ -41,11 +39,9 @@ def introduction(subject: Subject) -> str:
         + ("<p>A v with a number is a part of L that is computed first.</p>" if "<mi>v</mi>" in formula else "")
         + _KNOWN
     )
-    return meant + _picture(subject) + _moment(subject) + _parameters(subject) + asked
-
-
-def _sentence(about: str) -> str:
-    return f"The system: {escape(about.rstrip('.'))}."
+    rows = [[each, number(value)] for each, value in subject.system.parameters.items()]
+    parameters = Table("Parameters, numbers that stay", ["name", "value"], rows[:SHOWN]).html() if rows else ""
+    return meant + _picture(subject) + _moment(subject) + parameters + asked
 
 
 def _moment(subject: Subject) -> str:
@@ -79,11 +75,6 @@ def _chosen(subject: Subject) -> str:
     is_kept = f" {kept} {'are those' if ' and ' in kept else 'is that'} of the model’s start." if kept else ""
     chosen = chosen.replace(" and ", ", ", max(0, chosen.count(" and ") - 1))
     return f"The lesson has chosen {chosen}, so that every {subject.joint} moves.{is_kept}"
-
-
-def _parameters(subject: Subject) -> str:
-    rows = [[name, number(value)] for name, value in subject.system.parameters.items()]
-    return Table("Parameters, numbers that stay", ["name", "value"], rows[:SHOWN]).html() if rows else ""
 
 
 def _picture(subject: Subject) -> str:

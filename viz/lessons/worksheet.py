@@ -1,7 +1,5 @@
 """Worksheets of a lesson, to be printed: questions, graphs to mark, lines to fill; and the key to one."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from html import escape, unescape
@@ -29,20 +27,17 @@ def worksheet(subject: Subject, screens: Sequence[Screen], title: str, author: s
         if key
         else f'<p class="fill">{lines}</p>\n<section id="start"><h2>Before you begin</h2>\n{introduction(subject)}</section>\n{body}'
     )
+    text = re.sub(r'<math display="block">(?=(.*?)</math>)', _fitted, text, flags=re.DOTALL)
     heading = f"Key: {title}" if key else title
     return html.compose(
         heading,
-        f"<header><h1>{escape(heading)}</h1>{by}</header>\n<main>\n{_on_paper(text)}\n{'' if key else glossary(text).replace('<details', '<details open', 1)}\n</main>",
+        f"<header><h1>{escape(heading)}</h1>{by}</header>\n<main>\n{text}\n{'' if key else glossary(text).replace('<details', '<details open', 1)}\n</main>",
         asset(__package__, "worksheet.css"),
     )
 
 
-def _on_paper(text: str) -> str:
-    """Formulas as small as the widest row needs: paper has no scroll bar."""
-    return re.sub(r'<math display="block">(?=(.*?)</math>)', _small, text, flags=re.DOTALL)
-
-
-def _small(found: re.Match[str]) -> str:
+def _fitted(found: re.Match[str]) -> str:
+    """A formula as small as its widest row needs: paper has no scroll bar."""
     letters = max([len(unescape(re.sub("<[^>]*>", "", row))) for row in found[1].split("</mtr>")])
     return found[0] if letters <= WIDEST else f'{found[0][:-1]} style="font-size: {WIDEST / letters:.2f}em">'
 

@@ -1,7 +1,5 @@
 """Causes of a torque, or of how it depends on something: a number, a unit and a bar each, which add up to it."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, Sequence

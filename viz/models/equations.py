@@ -1,7 +1,5 @@
 """The equations of a model in the order and the form in which a textbook writes them: blocks of statements."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,14 +1,11 @@
 """The equations of a model as text, LaTeX and HTML."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from html import escape
 
-from cgraph import Node
-from cgraph._shared import LATEX, Side, columns, fraction, latex_block, number_text, statements
+from cgraph._shared import LATEX, columns, entries_of, fraction, latex_block, number_text, statements
 from cgraph.extend import Notation, Op, topological
 from dynamics.scenes.scenes import of_model
 from dynamics.systems.model import Model
@@ -77,20 +74,10 @@ def _text_block(block: Block, equations: Equations, lines: int, digits: int) -> 
 
 def _rounded(equations: Equations, digits: int) -> str:
     """Sentence on numbers that are shown with fewer digits than they have; empty where none is."""
-    entries = [
-        entry for block in equations.blocks for sides in block.statements for side in sides for entry in _entries(side)
-    ]
-    values = [node.value for node in topological(entries) if node.value is not None]
+    ends = [entry for block in equations.blocks for sides in block.statements for entry in entries_of(sides)]
+    values = [node.value for node in topological(ends) if node.value is not None]
     off = any(fraction(abs(value)) is None and float(f"{value:.{digits}g}") != value for value in values)
     return f"Numbers are rounded to {digits} digits; see --digits." if off else ""
-
-
-def _entries(side: Side) -> Iterator[Node]:
-    if isinstance(side, Node):
-        yield side
-    else:
-        for row in side:
-            yield from row
 
 
 def plain(digits: int = DIGITS) -> Notation:

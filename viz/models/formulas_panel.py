@@ -1,7 +1,5 @@
 """The physics of a model as formulas beside its graph, and what the torque by definition has too much."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

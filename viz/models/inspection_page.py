@@ -129,7 +129,7 @@ def inspection_page(
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         causes=content.causes,
-        notices=[*notices, *([cut_short(content)] if content.stopped else [])],
+        notices=[*notices, *([f"The motion is not whole: it {content.stopped}."] if content.stopped else [])],
         panels=[
             box(text_or_none(scene, scene.q, scene.qd)),
             *motions,
@@ -137,8 +137,3 @@ def inspection_page(
         ],
         view=next((each.name for each in versions if each.group == view), ""),
     )
-
-
-def cut_short(content: Inspection) -> str:
-    """Sentence on a motion that ends before its time."""
-    return f"The motion is not whole: it {content.stopped}."

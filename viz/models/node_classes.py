@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 
 from cgraph import Graph, Node
@@ -73,8 +74,11 @@ def form_classes(graph: Graph) -> Callable[[Node], str]:
     and what the torques reach; of momenta what the velocities need, and what only the rates of the momenta need.
     """
     momenta = "p0_dot" in graph.outputs
-    moving = _reached(graph, "p" if momenta else "qd")
-    driven = _reached(graph, "tau")
+    inputs = dict(zip(graph.input_names, graph.inputs, strict=True))
+    moving, driven = (
+        _users(graph, [node for name, node in inputs.items() if re.fullmatch(rf"{kind}\d+", name)])
+        for kind in ("p" if momenta else "qd", "tau")
+    )
     velocities = set(topological([node for name, node in graph.outputs.items() if momenta and name[0] == "q"]))
 
     def name(node: Node) -> str:
@@ -89,14 +93,6 @@ def form_classes(graph: Graph) -> Callable[[Node], str]:
         return ACCELERATIONS if node in driven else BIAS
 
     return name
-
-
-def _reached(graph: Graph, kind: str) -> set[Node]:
-    """The nodes that the inputs of a kind reach, such as p0, p1 .."""
-    names = zip(graph.input_names, graph.inputs, strict=True)
-    return _users(
-        graph, [node for name, node in names if name.startswith(kind) and name.removeprefix(kind).isdecimal()]
-    )
 
 
 def _users(graph: Graph, nodes: Iterable[Node]) -> set[Node]:

@@ -1,7 +1,5 @@
 """Sentences on a model: that inverse dynamics is that of its tree, and that a momentum is constant."""
 
-from __future__ import annotations
-
 from dynamics import scenes
 
 SHOWN = 4  # names; more are counted

@@ -1,7 +1,5 @@
 """Documents: headings, words, tables and pictures, as one HTML page or as Markdown, and the files of one."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

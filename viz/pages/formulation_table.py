@@ -1,7 +1,5 @@
 """Formulations of Lagrange's equation on pages: what they are called, and the one table of their sizes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from cgraph._shared import counted

@@ -1,7 +1,5 @@
 """Pages: one HTML file from its parts, with its policy; and the files that are parts."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

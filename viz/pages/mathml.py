@@ -1,7 +1,5 @@
 """Equations as MathML, which browsers draw without a script or a font from the net."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Pictures of a graph and of a motion for a notebook's cell, and how to see more."""
 
-from __future__ import annotations
-
 from html import escape
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Graphs and operations for scripts of pages: values as JavaScript, partials as programs, formulas as trees."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """The page of what was left out of a scene's graphs: tables and words from the plain data of a report."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from .document import Block, Document, Paragraph, ReportData, Section, Table, left_out

@@ -1,7 +1,5 @@
 """The page of run time beside error: plots, tables and words from the plain data of a report."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from .. import theme
@@ -24,6 +22,7 @@ def work_precision(content: ReportData) -> Document:
 
 def _introduction(content: ReportData) -> list[Block]:
     times = content["times"]
+    size = "natural size" if content["relative_to"] == "given" else "largest value"
     stiff = "; stiff" if content["stiff"] else ""
     return [
         *left_out(content["left_out"]),
@@ -33,7 +32,7 @@ def _introduction(content: ReportData) -> list[Block]:
         ),
         Paragraph(
             f"Errors are differences from an exact motion of {len(times)} instants, of each state relative to its "
-            f"{_sized(content)}. It was made by: {_sentence(content['reference'])} Its own error is "
+            f"{size}. It was made by: {_sentence(content['reference'])} Its own error is "
             f"{_power(content['reference_error'])}."
         ),
         Paragraph(
@@ -41,10 +40,6 @@ def _introduction(content: ReportData) -> list[Block]:
             f"derived or compiled in them. {_sentence(content['machine'])} {_busy(content)}"
         ),
     ]
-
-
-def _sized(content: ReportData) -> str:
-    return {"given": "natural size"}.get(content["relative_to"], "largest value")
 
 
 def _busy(content: ReportData) -> str:

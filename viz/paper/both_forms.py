@@ -1,7 +1,5 @@
 """Accelerations and momenta: the two forms of the equations of motion, their sizes, and their agreement."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Figure 7, of our own: both forms of the equations of motion by depth, and what the paper expects of the second."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 from cgraph import Counts, Graph
@@ -52,7 +50,12 @@ def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
     kinds = kinds_in(*shown[SPRING].values(), *shown[ARM].values())
     kinds.remove(theme.OUTPUT)  # a ring around a node here, as the captions say
     legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS), 1)
-    orders = {f"{form}, {method}": graph for method in METHODS for form, graph in _chain(LINKS, method).items()}
+    long, orders = chain(0.1, 0.1, LINKS), dict[str, Graph]()
+    for method in METHODS:
+        orders |= {f"Lagrange, {method}": state_equation(long, method)}
+        orders |= {f"Hamilton, {method}": hamilton_equations(long, method)}
+    each = [f"{title} {len(graph.nodes)} nodes, {graph.counts().depth} deep" for title, graph in orders.items()]
+    towers = f"Four towers over one scale of depth: {'; '.join(each)}."
     silhouettes = silhouettes_svg([LevelPanel(title, graph) for title, graph in orders.items()])
     blocks: list[Block] = [
         Paragraph(_answer(sizes[ARM]), point=True),
@@ -62,7 +65,7 @@ def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
         Paragraph(_cause(sizes[ARM])),
         Table("Sizes of both forms", ("", *SIZES), _rows(sizes), file="fig7"),
         Paragraph(_remedy(orders)),
-        drawn("fig7c", silhouettes, _silhouettes_caption(LINKS), "100%", _silhouettes_seen(orders)),
+        drawn("fig7c", silhouettes, _silhouettes_caption(LINKS), "100%", towers),
     ]
     data = {name: {form: _size(counts) for form, counts in each.items()} for name, each in sizes.items()}
     data[f"a planar chain of {LINKS}"] = {title: _size(graph.counts()) for title, graph in orders.items()}
@@ -100,11 +103,6 @@ def _seen(what: str, forms: Mapping[str, Counts]) -> str:
     return f"Two graphs of {what} side by side, inputs at the bottom: {'; '.join(each)}."
 
 
-def _silhouettes_seen(orders: Mapping[str, Graph]) -> str:
-    each = [f"{title} {len(graph.nodes)} nodes, {graph.counts().depth} deep" for title, graph in orders.items()]
-    return f"Four towers over one scale of depth: {'; '.join(each)}."
-
-
 def _answer(forms: Mapping[str, Counts]) -> str:
     lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
     return (
@@ -126,12 +124,6 @@ def _cause(forms: Mapping[str, Counts]) -> str:
         "are eliminated one after another. A rotor alone has nothing to eliminate, and is less deep by momenta. Times "
         "and longer chains are in docs/hamiltonian.md, “The momentum graph”."
     )
-
-
-def _chain(links: int, method: str) -> dict[str, Graph]:
-    """The two forms of a planar chain, by one order of elimination."""
-    arm = chain(0.1, 0.1, links)
-    return {"Lagrange": state_equation(arm, method), "Hamilton": hamilton_equations(arm, method)}
 
 
 def _remedy(orders: Mapping[str, Graph]) -> str:

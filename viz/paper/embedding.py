@@ -1,7 +1,5 @@
 """The law of the embedding: the error of the torque against the time step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Several graphs of the same quantities on one layout: what they share stays where it is, and each shows its own part."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,9 +1,5 @@
 """Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from cgraph._shared import Array, Json
@@ -16,9 +12,6 @@ from .. import theme
 from ..pages.document import Block, Markup, Paragraph, Table
 from ..plots import plot
 from .part import Part, plotted
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SNAPSHOTS = 6
 SHOWN = 8  # steps from one point of the residual to the next
@@ -70,10 +63,13 @@ def figures4_and_5() -> Part:
     )
     header = ("up to t [s]", "largest |difference in θ| [rad]")
     rows = [(f"{t:.2f}", f"{difference:.2e}") for t, difference in differences]
+    apart = np.abs(run.q - q)[::SHOWN]
+    shown = np.where(apart > 0.0, apart, np.nan)
+    errors = plot.over_time(run.t[::SHOWN], shown, "|Δθ| [rad]", theme.LINKS)
     grows = f"Differences of three joint angles over time, from {differences[0][1]:.0e} rad up to {differences[0][0]:g} s to {most:.0e} rad."
     blocks += [
         plotted("fig5", theirs, caption5, f"{seen}, with a dot of MuJoCo's on every joint and on its path."),
-        plotted("fig5-residual", _residual(run, q), residual, grows),
+        plotted("fig5-residual", errors, residual, grows),
         Table("Our trajectory and MuJoCo's", header, rows, folded=True, file="fig5"),
         Paragraph(
             "Both integrate by the classical Runge-Kutta method with the same step, so what differs is the equations of motion: "
@@ -121,12 +117,6 @@ def _moving(scene: Scene, run: Trajectory, ours: Array, theirs: Array | None) ->
     )
     dt = float(run.t[FRAME] - run.t[0])
     return Markup(markup, caption), {"motion": {"dt": dt, "ours": frames[0], "theirs": frames[1]}}
-
-
-def _residual(run: Trajectory, q: Array) -> Figure:
-    """|difference| of each joint's angle over time."""
-    difference = np.abs(run.q - q)[::SHOWN]
-    return plot.over_time(run.t[::SHOWN], np.where(difference > 0.0, difference, np.nan), "|Δθ| [rad]", theme.LINKS)
 
 
 def _largest_differences(run: Trajectory, q: Array, windows: int = 6) -> list[tuple[float, float]]:

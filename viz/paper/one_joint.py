@@ -1,7 +1,5 @@
 """Equation (3) and Figures 1 to 3: one rotor on a spring, by the three formulations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The paper's figures and tables in one folder, with one page of all: the order of the parts."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """The figure that moves: graphs on one layout, chosen by a button, with every node's formula and value at a step dt."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape

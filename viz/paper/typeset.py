@@ -1,7 +1,5 @@
 """Formulas of the paper's page as MathML, from short texts: words apart by blanks, `a/b` a fraction, `a_b` and `a^b` indices."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from html import escape

@@ -1,7 +1,5 @@
 """Errors of a C function in float: bounds at random points of a box of inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

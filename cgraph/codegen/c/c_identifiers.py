@@ -1,7 +1,5 @@
 """Names in C: of a function, checked; of places in its arrays, made from the names of inputs and outputs."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import re
@@ -32,13 +30,9 @@ def check_function_name(name: str) -> None:
         raise ValueError(f"the name of a C function must be a letter, then letters, digits and _, got {name!r:.60}")
     if len(name) > LONGEST_NAME:
         raise ValueError(f"the name of a C function may have {LONGEST_NAME} characters, got {len(name)}: {name:.60}")
-    if name in _TAKEN or _MACROS.fullmatch(name) or _is_in_the_library(name):
+    library = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)  # the program would take its name in silence
+    if name in _TAKEN or _MACROS.fullmatch(name) or hasattr(library, name):
         raise ValueError(f"the name of a C function must not be a word of C, C++ or their library, got {name!r}")
-
-
-def _is_in_the_library(name: str) -> bool:
-    """Whether the C library of this system has the name, which the program would take from it in silence."""
-    return hasattr(ctypes.CDLL("ucrtbase" if os.name == "nt" else None), name)
 
 
 def distinct(names: Sequence[str]) -> list[str]:
@@ -47,7 +41,7 @@ def distinct(names: Sequence[str]) -> list[str]:
     A name that is such a word stays; Greek letters are spelled out; other characters become _, and its place follows
     where two names would become one.
     """
-    words = [_word(name) for name in names]
+    words = ["".join([_letters(character) for character in unicodedata.normalize("NFKC", name)]) for name in names]
     taken = {name for name, word in zip(names, words, strict=True) if word == name}
     for i, name in enumerate(names):
         if words[i] != name:
@@ -57,10 +51,6 @@ def distinct(names: Sequence[str]) -> list[str]:
                 words[i] += "_"
             taken.add(words[i])
     return words
-
-
-def _word(name: str) -> str:
-    return "".join([_letters(character) for character in unicodedata.normalize("NFKC", name)])
 
 
 def _letters(character: str) -> str:

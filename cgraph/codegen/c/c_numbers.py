@@ -1,7 +1,5 @@
 """Numbers of a C program, double or float: their texts, and the texts of operations on them."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass
@@ -67,10 +65,6 @@ class CNumbers:
                 "its row needs the column `c`, with `c_helper` for a function that it calls"
             )
         return self.adapted(row.c)
-
-    def helper(self, op: Row) -> str:
-        """C function that the operation calls, or nothing."""
-        return self.adapted(columns(op).c_helper)
 
     def adapted(self, text: str) -> str:
         """A text of doubles in these numbers."""

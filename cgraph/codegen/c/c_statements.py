@@ -1,10 +1,9 @@
 """The body in C: the functions of a graph's statements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from ...core.node import VARIABLE, Node
+from ...operations.operation import columns
 from ..statements import statements
 from .c_numbers import CNumbers
 
@@ -31,7 +30,8 @@ def functions(
         f"const {kind}",
         lambda node: f" /* {comment(node.name)} */" if node.name else "",
     )
-    helpers = [text.format(name=name) for text in dict.fromkeys([numbers.helper(op) for op in found.ops]) if text]
+    texts = dict.fromkeys([numbers.adapted(columns(op).c_helper) for op in found.ops])
+    helpers = [text.format(name=name) for text in texts if text]
     body = found.direct
     if len(found.parts) > 1:
         called = [f"{name}_part_{k}" for k in range(1, len(found.parts) + 1)]

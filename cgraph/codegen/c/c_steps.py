@@ -1,7 +1,5 @@
 """Steps of explicit Runge-Kutta methods in C: a loop over the stages, with one call of the rate."""
 
-from __future__ import annotations
-
 from ..explicit_method import Tableau, weighted_sum
 from .c_numbers import CNumbers
 

@@ -1,7 +1,5 @@
 """A finding: one thing in a graph that is not as declared, in words, in nodes and edges, and for JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Independence: the proof that no path leads from one group of nodes to another, or the edges to blame for one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 

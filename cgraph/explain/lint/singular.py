@@ -1,7 +1,5 @@
 """Singular nodes: operations whose slope is unbounded, or that have no value, somewhere in a box of inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from ...core.evaluation import box_interval
@@ -52,7 +50,9 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
         reason = singular_at(columns(node.op), [bounds[arg] for arg in node.args]) if node.args else None
         if reason is not None:
             arguments = {names.text(arg): bounds[arg] for arg in node.args if arg.value is None}
-            within = " and ".join([f"{name} is within {_shown(bound)}" for name, bound in arguments.items()])
+            within = " and ".join(
+                [f"{name} is within [{low:.4g}, {high:.4g}]" for name, (low, high) in arguments.items()]
+            )
             data: dict[str, Json] = {
                 "number": names.number[node],
                 "operation": node.op.name,
@@ -69,7 +69,3 @@ def _given(names: Names, box: Box) -> dict[str, Interval]:
     """The box by the graph's names. Raises as `intervals` does."""
     known = names.inputs_of("box", require_mapping("box", box, "input: interval"))
     return {name: box_interval(names.shown(name), value) for name, value in known.items()}
-
-
-def _shown(bound: Interval) -> str:
-    return f"[{bound[0]:.4g}, {bound[1]:.4g}]"

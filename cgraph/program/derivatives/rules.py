@@ -1,7 +1,5 @@
 """The rules of the statements: derivatives of graphs, linear equations, branches, and equations solved by turns."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -5,8 +5,6 @@ entries of that size alone, and hold it still. Scaled by itself such a row is as
 loop it is seen to be no more than the rounding of numbers in a file.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

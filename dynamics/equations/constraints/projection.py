@@ -6,8 +6,6 @@
 Both are solved by the matrix of the equations of motion, see `constraints`.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 

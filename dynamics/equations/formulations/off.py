@@ -1,7 +1,5 @@
 """How many torques of a formulation are off, and how many of their slopes."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import NamedTuple

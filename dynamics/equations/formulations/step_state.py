@@ -1,7 +1,5 @@
 """States before and after the embedded step, qd = qdd dt + qd_old and q = G qd dt + q_old, as numbers by name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from cgraph import Graph

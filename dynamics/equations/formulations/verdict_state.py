@@ -1,7 +1,5 @@
 """The state at which a verdict is told: one that it chooses, or one that is asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

@@ -4,8 +4,6 @@ From tau(q, qd, qdd) = const:  M dqdd = dtau - (d tau / dx) dx, one column for e
 tau. M is factored once; a column is then a graph of its own, small, and alike for all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple

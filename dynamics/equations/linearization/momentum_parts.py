@@ -11,8 +11,6 @@ c(u, v), P_kj = p . c(e_j, e_k). Where velocities are rates of coordinates, S is
 damping A is J H'', H'' = [[K - S, -X^T], [-X, M^-1]], to the last bit: mirrored entries are one node.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from cgraph import Graph

@@ -1,7 +1,5 @@
 """Solving with the mass matrix: one factorization, any number of right-hand sides."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NamedTuple, TypeVar

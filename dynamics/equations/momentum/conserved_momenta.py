@@ -44,7 +44,8 @@ def conserved_momenta(model: Model) -> tuple[str, ...]:
     for form in (system, system.shortened):
         if form is not None:
             constant |= {i for i, rate in enumerate(_rates(form)) if rate.value == 0.0} - _jumping(form)
-    constrained = _constrained(system)
+    slopes = [cotangents({rate: ONE}, system.qd, Builder()) for rate in system.constraints.rates]
+    constrained = {i for row in slopes for i, slope in enumerate(row) if slope.value != 0.0}
     return tuple([name for i, name in enumerate(system.velocities) if i in constant - constrained])
 
 
@@ -78,9 +79,3 @@ def _jumping(system: System) -> set[int]:
                 slopes = system.kinematics.slopes(cotangents({arg: ONE}, system.q, build), [ZERO] * system.n, build)
                 moving |= {i for i, slope in enumerate(slopes) if slope.value != 0.0}
     return moving
-
-
-def _constrained(system: System) -> set[int]:
-    """The velocities that constraints depend on."""
-    slopes = [cotangents({rate: ONE}, system.qd, Builder()) for rate in system.constraints.rates]
-    return {i for row in slopes for i, slope in enumerate(row) if slope.value != 0.0}

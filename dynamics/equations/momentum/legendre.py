@@ -1,7 +1,5 @@
 """The Legendre transform as nodes: the velocities that belong to momenta, and what else depends on them, put there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import cached_property

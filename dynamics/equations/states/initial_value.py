@@ -1,7 +1,5 @@
 """Initial value problems as a caller states them: the start, constant forces, parameter values and times, checked."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, building, folded
@@ -45,7 +43,11 @@ def torque_by_link(model: Model) -> TorqueTable:
     """
     system = as_system(model)
     build = Builder()
-    rows = [_torque_of(system, partial, build) for partial in folded(system.partial_lagrangians, Builder())]
+    rows = []
+    for partial in folded(system.partial_lagrangians, Builder()):
+        _, rate, gradient = lagrange_sweeps(system, partial, build)  # of Lagrange's equation, by the chain rule
+        with building(build):
+            rows.append([p_dot - slope for p_dot, slope in zip(rate, gradient, strict=True)])
     names = names_of_partials(system)
     outside = _damping_and_forces(system, build)
     rows += outside.values()
@@ -101,13 +103,6 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
     return TorqueTable("torque by joint motion", system.velocities, tuple(names), system, graph, sum_axis=1)
 
 
-def _torque_of(system: System, partial: Node, build: Builder) -> list[Node]:
-    """Lagrange's equation of one partial Lagrangian, by the chain rule."""
-    _, rate, gradient = lagrange_sweeps(system, partial, build)
-    with building(build):
-        return [p_dot - slope for p_dot, slope in zip(rate, gradient, strict=True)]
-
-
 def _damping_and_forces(system: System, build: Builder) -> dict[str, list[Node]]:
     """Torques against damping and against applied forces, each where there is any."""
     damping = system.braking(build)
@@ -119,10 +114,7 @@ def _damping_and_forces(system: System, build: Builder) -> dict[str, list[Node]]
 
 def names_of_partials(system: System) -> list[str]:
     """Names of the partial Lagrangians: their one tag, as a link's or a body's; else L1, L2, ..."""
-    names: Sequence[str] = [_single_tag(partial.tags - _ENERGIES) for partial in system.partial_lagrangians]
+    tags = [partial.tags - _ENERGIES for partial in system.partial_lagrangians]
+    names = [next(iter(each)) if len(each) == 1 else "" for each in tags]
     unique = all(names) and len(set(names)) == len(names)
-    return list(names) if unique else [f"L{k + 1}" for k in range(len(names))]
-
-
-def _single_tag(tags: frozenset[str]) -> str:
-    return next(iter(tags)) if len(tags) == 1 else ""
+    return names if unique else [f"L{k + 1}" for k in range(len(names))]

@@ -1,7 +1,5 @@
 """Case results: measurements of one case by one method beside their bounds, and known reasons where they are beyond."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple

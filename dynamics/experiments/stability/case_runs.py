@@ -1,7 +1,5 @@
 """Case runs: every case of the stability table by the methods that suit it, measured beside the case's bounds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from functools import partial

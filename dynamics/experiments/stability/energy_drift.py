@@ -1,7 +1,5 @@
 """Energy over long runs of equal steps: the band in which it stays, and the drift with its statistical error."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import NamedTuple

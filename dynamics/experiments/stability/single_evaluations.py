@@ -232,21 +232,15 @@ def sine_results(count: int = COUNT, backends: Sequence[str] | None = None) -> I
     known = {name: exact(each) for name, each in points.items()}
     for backend in backends or available():
         function = cg.compile(graph, backend)
-        for way, evaluate in ((backend, _one_by_one), (f"{backend}, batch", _in_a_batch)):
-            off = {name: ulps(evaluate(function, points[name]), known[name]) for name in RANGES}
+        alone = {name: np.array([function([x]) for x in each.tolist()]).T for name, each in points.items()}
+        together = {name: function.batch(each[None]) for name, each in points.items()}
+        for way, values in ((backend, alone), (f"{backend}, batch", together)):
+            off = {name: ulps(values[name], known[name]) for name in RANGES}
             rows = tuple(
                 [Measurement(f"{name} rad", off[name], SINE_BOUND, "ulp", "of the exact value") for name in off]
             )
             about = f"{count} random angles of each range, both signs"
             yield CaseResult(SINES, SINE_CASE, about, way, rows, reason=reason(SINES, SINE_CASE, way, rows))
-
-
-def _one_by_one(function: cg.Compiled, points: Array) -> Array:
-    return np.array([function([each]) for each in points.tolist()]).T
-
-
-def _in_a_batch(function: cg.Compiled, points: Array) -> Array:
-    return function.batch(points[None])
 
 
 def angles(low: float, high: float, count: int) -> Array:

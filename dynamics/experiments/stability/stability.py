@@ -1,7 +1,5 @@
 """Stability: the table of stiff and extreme cases, a result a row, and its forms as text, plain data and CSV."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import textwrap

@@ -1,7 +1,5 @@
 """Measurement of solvers: their errors against the exact motion, from coarse to fine, and run times in turns."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """The tasks that integrators are compared on, by name: scenes, cases of the stability table, and model files."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Solvers: ways to integrate a task, timed from its start to t_end; ours are the methods of `simulate`."""
 
-from __future__ import annotations
-
 import math
 import time
 from abc import ABC, abstractmethod

@@ -1,7 +1,5 @@
 """Work and precision: a report of run time beside error of every integrator on one task."""
 
-from __future__ import annotations
-
 import math
 import statistics
 from collections.abc import Callable, Sequence

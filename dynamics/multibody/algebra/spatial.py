@@ -3,8 +3,6 @@
 An array may be one of objects: floats, and nodes where there are parameters. Rotations are floats alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import reduce
 

@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -247,10 +248,6 @@ def _mass(what: str, value: object) -> float | Node:
     return quantity(what, value, " kg")
 
 
-def _any_number(what: str, value: object) -> float | Node:
-    return quantity(what, value, minimum=-math.inf)
-
-
 def checked(body: Body) -> Body:
     """The body with its numbers as arrays and floats, its axis of length 1. Raises MechanismError for what is wrong.
 
@@ -369,6 +366,6 @@ JOINT_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
     "position": quantities,
     "damping": quantity,
     "stiffness": quantity,
-    "spring_reference": _any_number,
+    "spring_reference": partial(quantity, minimum=-math.inf),
     "armature": quantity,
 }

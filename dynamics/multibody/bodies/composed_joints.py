@@ -1,7 +1,5 @@
 """Bodies on composed joints, written as chains of massless bodies on the joints that these are made of."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace

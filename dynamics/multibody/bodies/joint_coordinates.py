@@ -1,7 +1,5 @@
 """The coordinates and velocities of the joints of a tree of bodies, one joint after another."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import partial

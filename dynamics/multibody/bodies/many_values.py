@@ -1,7 +1,5 @@
 """Many values of the numbers of bodies at once: which of them a check surely takes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -154,14 +154,16 @@ def attach_with_impact(
     q_new, qd_old = whole.map_state_from(mechanism, q, qd)
     index = {name: i for i, name in enumerate(whole.velocities)}
     p = np.zeros(len(index))
-    before = _momentum(mechanism.bind(), q, qd)
+    alone = _inertia_alone(mechanism.bind())
+    before = arrays_at(alone, momentum(alone), q, qd)["p"]
     p[[index[name] for name in mechanism.velocities]] = before
     given = whole.shared.parts(bound_body(body, whole.parameter_values))[-1]
     mass = float(given.mass)
     free, linear, angular = _motion(whole.bind(), given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
     p += mass * linear.T @ v + angular.T @ inertia @ w
-    qd_new = _velocities(whole.bind(), q_new, p)
+    alone = _inertia_alone(whole.bind())
+    qd_new = arrays_at(alone, forward_dynamics(alone), q_new, tau=p)["qdd"]  # M^-1 p; what loops let through of it
     energy = float(qd @ before + mass * v @ v + w @ inertia @ w - qd_new @ p) / 2.0
     return Attached(whole, q_new, qd_new, energy)
 
@@ -219,18 +221,6 @@ def _motion(mechanism: Mechanism, body: Body, q: Array, qd: Array) -> tuple[Free
     position, velocity, omega = (np.array([of[name] for name in names.split()]) for names in _COMPONENTS)
     turn = np.array([[of[f"R_{i}_{j}"][0] for j in range(3)] for i in range(3)])
     return FreeBody(position[:, 0], velocity[:, 0], omega[:, 0], turn), velocity[:, 1:], omega[:, 1:]
-
-
-def _momentum(mechanism: Mechanism, q: Array, qd: Array) -> Array:
-    """Generalized momenta M qd, (n,)."""
-    alone = _inertia_alone(mechanism)
-    return arrays_at(alone, momentum(alone), q, qd)["p"]
-
-
-def _velocities(mechanism: Mechanism, q: Array, p: Array) -> Array:
-    """M^-1 p, (n,): the accelerations at rest under p alone; with loops those that they let through."""
-    alone = _inertia_alone(mechanism)
-    return arrays_at(alone, forward_dynamics(alone), q, tau=p)["qdd"]
 
 
 def _inertia_alone(mechanism: Mechanism) -> Mechanism:

@@ -1,7 +1,5 @@
 """Gravity, damping, springs, armature and forces switched off in a model, or put in where they are absent."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -61,11 +59,8 @@ def _with(model: Mechanism, effect: str, number: float, among: Collection[str] |
     if effect == "springs" and not number:
         change["spring_reference"] = 0.0
 
-    def with_it(body: Body) -> Body:
-        chosen = body.joint.moves if among is None else body.name in among
-        return replace(body, joint=replace(body.joint, **change)) if chosen else body
-
-    return changed(model, bodies=tuple([with_it(body) for body in model.bodies]))
+    names = [body.name for body in model.bodies if body.joint.moves] if among is None else among
+    return _replaced(model, names, lambda body: replace(body, joint=replace(body.joint, **change)))
 
 
 def absent_parts(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str, Mechanism]]:
@@ -87,9 +82,13 @@ def absent_parts(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str,
         if without:
             yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
     if massless := [body.name for body in model.bodies if not _frame(model, body) and not _has_inertia(body)]:
-        yield f"mass of {_listed(massless)}", "it is zero", _replaced(model, massless, _heavy)
+        heavy: dict[str, Any] = {"mass": 1.0, "center": (0.1, 0.2, 0.3), "inertia": (0.1, 0.2, 0.25)}
+        with_mass = _replaced(model, massless, lambda body: replace(body, **heavy))
+        yield f"mass of {_listed(massless)}", "it is zero", with_mass
     if welds := [body.name for body in model.bodies if not (body.joint.moves or vanishes(body.mass))]:
-        yield f"joint of {_listed(welds)}", "it is welded on", _replaced(model, welds, _hinged)
+        hinge: dict[str, Any] = {"kind": "revolute", "armature": NUMBER}
+        hinged = _replaced(model, welds, lambda body: replace(body, joint=replace(body.joint, **hinge)))
+        yield f"joint of {_listed(welds)}", "it is welded on", hinged
 
 
 def _in_parts(model: Mechanism) -> Mechanism:
@@ -115,16 +114,8 @@ def _frame(model: Mechanism, body: Body) -> bool:
     return not (carries or body.joint.moves or _has_inertia(body))
 
 
-def _replaced(model: Mechanism, names: Sequence[str], change: Callable[[Body], Body]) -> Mechanism:
+def _replaced(model: Mechanism, names: Collection[str], change: Callable[[Body], Body]) -> Mechanism:
     return changed(model, bodies=tuple([change(body) if body.name in names else body for body in model.bodies]))
-
-
-def _heavy(body: Body) -> Body:
-    return replace(body, mass=1.0, center=(0.1, 0.2, 0.3), inertia=(0.1, 0.2, 0.25))
-
-
-def _hinged(body: Body) -> Body:
-    return replace(body, joint=replace(body.joint, kind="revolute", armature=NUMBER))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -1,7 +1,5 @@
 """Ball: a joint that turns the body about a point."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a type of joint fits together: what it says of places, velocities, accelerations and momenta."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import cgraph as cg

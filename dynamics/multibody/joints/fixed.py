@@ -1,7 +1,5 @@
 """Fixed: a weld, which has no coordinate."""
 
-from __future__ import annotations
-
 from .joint_type import AxialJoint
 
 

@@ -1,7 +1,5 @@
 """Free: no joint at all, a body that moves as it likes; its linear velocity in the axes of the joint, as in MuJoCo."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

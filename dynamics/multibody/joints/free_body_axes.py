@@ -1,7 +1,5 @@
 """Free, in the body's axes: as `free`, with the linear velocity in the body's axes, as in Pinocchio."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from cgraph import Node

@@ -1,7 +1,5 @@
 """Prismatic: a slide, which moves the body along the joint's axis."""
 
-from __future__ import annotations
-
 from cgraph import Node
 
 from .joint_type import AxialJoint

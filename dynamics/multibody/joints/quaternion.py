@@ -1,7 +1,5 @@
 """Unit quaternions (w, x, y, z) as coordinates of a rotation, and angular velocities in the body's axes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import cgraph as cg

@@ -1,7 +1,5 @@
 """Revolute: a hinge, which turns the body about the joint's axis."""
 
-from __future__ import annotations
-
 from cgraph import Node
 
 from .joint_type import AxialJoint

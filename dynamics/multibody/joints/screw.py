@@ -1,7 +1,5 @@
 """Screw: a nut, which the screw's pitch moves along the axis as it turns."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from cgraph import Node

@@ -8,8 +8,6 @@ numbers in place of ten. What is given to the world shows in no motion and is go
 6(3), 1990; M. Gautier, W. Khalil, "Direct calculation of minimum set of inertial parameters of serial robots", 1990.)
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

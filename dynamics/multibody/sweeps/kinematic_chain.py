@@ -1,7 +1,5 @@
 """Kinematic chains: where points and directions of a body are, in the world or on a body inwards, and how they move."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -129,7 +127,10 @@ def kinematic_chains(
     states: of the links of the moving bodies.
     """
     index = {body.name: i for i, body in enumerate(moving)}
-    paths = [_path(carrier.name, moving, index) for carrier in carriers]
+    paths = [[carrier.name] for carrier in carriers]  # a body and those that carry it, to the world
+    for path in paths:
+        while path[-1] in index:
+            path.append(moving[index[path[-1]]].parent)
     common = next(name for name in paths[0] if all([name in path for path in paths]))
     needed = {common, *[carrier.name for carrier in carriers]}
     axes = {name: np.eye(3) if name == WORLD else axes_of(moving[index[name]]) for name in needed}
@@ -140,11 +141,3 @@ def kinematic_chains(
         orientation = spatial.snapped(own.T @ carrier.orientation)
         result.append(KinematicChain(spatial.product(own.T, carrier.position), orientation, steps, axes[common]))
     return result
-
-
-def _path(name: str, moving: Sequence[Body], index: dict[str, int]) -> list[str]:
-    """A moving body and those that carry it, to the world."""
-    path = [name]
-    while path[-1] in index:
-        path.append(moving[index[path[-1]]].parent)
-    return path

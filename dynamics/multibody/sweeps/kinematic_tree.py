@@ -1,7 +1,5 @@
 """Trees of bodies put in order: parents first, welds merged, each coordinate seen to move something."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -265,7 +265,8 @@ def torque_derivatives(states: Sequence[LinkState], up: Triple, build: Builder) 
         composites: list[MovingInertia | None] = [None] * len(states)
         for i, flat in reversed(list(enumerate(trees_in_a_plane(states)))):
             at, frame, carried = states[i], frames[i], composites[i]
-            link = _about_z(at.link) if flat else at.link
+            about_z = at.link.inertia[2][2]  # the only moment that counts where all joints turn about z
+            link = replace(at.link, inertia=[[0.0], [0.0, 0.0], [0.0, 0.0, about_z]]) if flat else at.link
             with cg.tag(at.name):
                 alone = moving_body(link, frame.axes, frame.velocity, frame.acceleration, tags)
             composite = alone if carried is None else alone.plus(carried)
@@ -296,11 +297,6 @@ def _add_spring(result: TorqueDerivatives, at: LinkState, build: Builder) -> Non
         seeds = gathered(zip(rate, cotangents({force: ONE}, at.q, build), strict=True))
         for j, slope in zip(range(at.first, end), cotangents(seeds, at.u, build), strict=True):
             result.by_q[i][j] = result.by_q[i][j] + slope
-
-
-def _about_z(link: Link) -> Link:
-    """The link with the only moment of inertia that counts where all joints turn about z: it does not turn itself."""
-    return replace(link, inertia=[[0.0], [0.0, 0.0], [0.0, 0.0, link.inertia[2][2]]])
 
 
 def _fill(

@@ -45,13 +45,13 @@ def run(command):
     return result.stdout
 
 
-def called(library, name, graph, points):
+def called(library, name, graph, points, dtype=np.float64):
     function = library[name]
     function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], None
-    found = np.full((len(points), len(graph.outputs)), 123.0)
-    for point, row in zip(np.array(points, dtype=float).reshape(len(points), -1), found, strict=True):
+    found = np.full((len(points), len(graph.outputs)), 123.0, dtype)
+    for point, row in zip(np.array(points, dtype).reshape(len(points), -1), found, strict=True):
         function(point.ctypes.data, row.ctypes.data)
-    return found
+    return found.astype(float)
 
 
 def agrees(folder, graphs, points, flags=("-O2",)):

@@ -15,7 +15,7 @@ from cgraph.core.node import apply
 from cgraph.core.row import ROWS
 from cgraph.operations.operation import OPS
 from dynamics.integrators import TABLEAUS
-from tests.cgraph.codegen.test_c import CC, CXX, STRICT, WARNINGS, build, needs_cc, run
+from tests.cgraph.codegen.test_c import CC, CXX, STRICT, WARNINGS, build, called, needs_cc, run
 from tests.cgraph.engines import evaluated, points_of
 from tests.each_row import each_row
 from tests.javascript import stepped_by_js
@@ -25,15 +25,6 @@ from tests.ulps import same
 X, Y, T = cg.variables("x y t")
 SINGLE = ["-Wdouble-promotion", "-Wfloat-conversion", "-Wunsuffixed-float-constants"]  # no arithmetic of doubles
 SMALL = {"rk4": TABLEAUS["rk4"]}
-
-
-def called(library, name, points, count):
-    function = library[name]
-    function.argtypes, function.restype = [ctypes.c_void_p, ctypes.c_void_p], None
-    given, found = np.array(points, dtype=np.float32), np.full((len(points), count), 123.0, dtype=np.float32)
-    for point, row in zip(given, found, strict=True):
-        function(point.ctypes.data, row.ctypes.data)
-    return found.astype(float)
 
 
 def stepped(library, name, inputs, h, n):
@@ -68,7 +59,7 @@ def test_errors_of_float_stay_below_the_bound_that_the_header_states(name, tmp_p
     source = cg.to_c(graph, name, dtype="float32", box=box)
     points = np.random.default_rng(1).uniform(*np.transpose([*box.values()]), (300, len(box)))
     library = build(tmp_path_factory.mktemp(name), [source], ["-O2", *SINGLE])
-    off = np.abs(called(library, name, points, len(graph.outputs)) - evaluated(graph, points)).max(axis=0)
+    off = np.abs(called(library, name, graph, points, np.float32) - evaluated(graph, points)).max(axis=0)
     bounds = np.array([*source.errors.values()])
     assert np.all(off <= bounds)
     assert np.all(off >= 1e-2 * bounds)  # and say something, also of an elimination
@@ -88,7 +79,7 @@ def test_every_operation_is_one_of_float_alone(tmp_path):
     for op in OPS.values():
         name = f"op_{op.name}"
         points = np.float32([point for point in points_of(op, 20) if np.all(np.abs(point) < 1e3)])
-        found = called(library, name, points, len(graphs[name].outputs))[:, 0]
+        found = called(library, name, graphs[name], points, np.float32)[:, 0]
         exact = evaluated(graphs[name], points.astype(float))[:, 0]
         usable = np.isfinite(exact) & (np.abs(exact) < 1e38) & (np.abs(exact) > 1e-37)
         np.testing.assert_allclose(found[usable], exact[usable], rtol=1e-6, err_msg=op.name)

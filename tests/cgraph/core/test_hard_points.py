@@ -109,12 +109,6 @@ def test_what_is_not_taken_does_not_reach_a_derivative(name):
         assert found == pytest.approx([expected] * len(found), rel=TOLERANCE, abs=TOLERANCE)
 
 
-def test_nan_in_an_operand_of_minimum_is_the_value_as_in_numpy():
-    x = cg.variable("x")
-    graph = cg.Graph([x], {"f": cg.minimum(x, cg.log(x)), "g": cg.maximum(cg.log(x), x)})
-    assert all(math.isnan(value) for value in graph.evaluate({"x": -1.0}).values())
-
-
 # First and second derivatives in the first argument at points where there is a limit, a side or a convention alone.
 POWERS = {  # of x**exponent at 0: exponent * 0**(exponent - 1), exponent * (exponent - 1) * 0**(exponent - 2)
     -1: (-INF, INF), 0: (0, 0), 0.5: (INF, -INF), 1: (1, 0), 1.5: (0, INF), 2: (0, 2), 2.5: (0, 0), 3: (0, 0), 4: (0, 0)
@@ -203,11 +197,3 @@ def test_products_with_zeros_have_exact_derivatives(point):
     assert square["second"] == [2 * y * z] * 6
     quotient = derivatives(lambda x, y, z: x * y / (z + 1), *point)
     assert quotient["first"] == [y / (z + 1)] * 3
-
-
-def test_a_zero_factor_as_written_follows_ieee():
-    x = cg.variable("x")
-    graph = cg.Graph([x], {"f": 0 * x})
-    assert math.isnan(graph.evaluate({"x": INF})["f"])
-    assert graph.evaluate({"x": 3.0}) == {"f": 0.0}
-    assert cg.gradient(graph).evaluate({"x": 3.0}) == {"df/dx": 0.0}

@@ -49,11 +49,6 @@ def test_signs_and_abs():
     assert value(abs(-x)) == X
 
 
-def test_equal_compares_values_and_not_nodes():
-    assert value(cg.equal(x, X)) == value(cg.less_equal(x, X)) == value(cg.not_equal(x, y)) == 1.0
-    assert value(cg.equal(x, y)) == value(cg.less(x, X)) == value(cg.not_equal(x, X)) == 0.0
-
-
 @each_row("operation", [operator.add, operator.mul, operator.lt])
 def test_what_is_no_number_is_a_type_error(operation):
     for wrong in ("1", None, 1j, [1.0], object()):
@@ -107,10 +102,3 @@ def test_matrices_times_vectors_of_nodes():
     assert value(nodes @ nodes) == X * X + Y * Y
     matrix = np.array([[x, y], [y, x]])
     assert [value(each) for each in matrix @ nodes] == pytest.approx([X * X + Y * Y, 2 * X * Y], rel=LAST_BITS)
-
-
-def test_where_chooses_by_any_nonzero_condition():
-    for condition, expected in ((1.0, X), (-0.5, X), (math.inf, X), (0.0, Y), (-0.0, Y)):
-        assert value(cg.where(condition, x, y)) == expected
-    assert value(cg.where(x > y, x, y)) == X
-    assert value(cg.where(x < y, x, y)) == Y

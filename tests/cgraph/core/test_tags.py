@@ -79,19 +79,14 @@ def test_a_second_derivative_has_both_roles():
     assert labels(cg.jvp(graph)) == {label("cos", "a", "tangent"), label("mul", "a", "tangent")}
 
 
-def test_tags_around_a_transform_do_not_stick_to_derivatives():
-    graph = cg.Graph([x], {"f": cg.sin(x) * x})
-    with cg.tag("while differentiating"):
-        for transform in (cg.jvp, cg.vjp, cg.gradient, cg.jacobian, cg.hessian, cg.simplify):
-            assert set().union(*(node.tags for node in transform(graph).nodes)) == set()
-
-
 @settings(max_examples=examples(50))
 @given(cases())
 def test_a_derivative_has_no_tag_that_the_graph_has_not(case):
     written = set().union(*(node.tags for node in case.graph.nodes))
-    for transform in (cg.jvp, cg.vjp, cg.jacobian, cg.simplify):
-        assert set().union(*(node.tags for node in transform(case.graph).nodes)) <= written
+    one = [cg.hessian, cg.gradient] if len(case.graph.outputs) == 1 else []
+    with cg.tag("while differentiating"):
+        for transform in (cg.jvp, cg.vjp, cg.jacobian, cg.simplify, *one):
+            assert set().union(*(node.tags for node in transform(case.graph).nodes)) <= written
 
 
 def test_merging_unites_tags_and_roles():

@@ -6,6 +6,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph import Node
+from tests.dynamics.mechanisms import TREES, random_state
 from tests.dynamics.models import Array, run
 from tests.trust.random_motions import random_task
 
@@ -40,6 +41,21 @@ def linkage(seed: int) -> tuple[dyn.System, Array, Array]:
     return dyn.System(lagrangian, [f"x{i}" for i in range(n + 1)]), *rng.uniform(-2.0, 2.0, (2, n + 1))
 
 
+def without_velocity_nodes() -> dict[str, tuple[dyn.System, Array, Array]]:
+    """Products of two coordinates, and quasi-velocities: no velocity node but qd is known, and none may be made up."""
+    bent = dyn.System(
+        lambda q, qd, t: (
+            0.5 * (q[1] * qd[0] + q[0] * qd[1] + 2.0 * cg.sin(t)) ** 2 + 0.5 * (q[1] * qd[0]) ** 2 + qd[1] ** 2
+        ),
+        "x y",
+    )
+    balls = TREES["balls"]()
+    quasi, parts = balls.system.kinematics.quasi, list(balls.system.partial_lagrangians)
+    plain = dyn.System(lambda q, qd, t: parts, balls.coordinates, quasi_velocities=quasi)
+    q, qd, _, _ = random_state(balls, 3)
+    return {"bent": (bent, np.array([0.4, -0.7]), np.array([1.1, 0.3])), "balls": (plain, q, qd)}
+
+
 def compared(model: dyn.System, q: Array, qd: Array, seed: int) -> tuple[dict[str, float], int, int]:
     """Errors over the largest torque near this state, and by how many nodes the default is smaller than both others."""
     off, qdd = np.random.default_rng(seed).normal(size=(2, len(q)))
@@ -58,7 +74,7 @@ def compared(model: dyn.System, q: Array, qd: Array, seed: int) -> tuple[dict[st
 def test_inverse_dynamics_by_default_and_by_velocities_is_that_of_the_chain_rule(count: int) -> None:
     tasks = [random_task(number) for number in {*range(count), REWRITTEN}]
     rows = {task.name: (task.model, np.array(task.q), np.array(task.qd)) for task in tasks}
-    rows |= {f"linkage {seed}": linkage(seed) for seed in range(count)}
+    rows |= {f"linkage {seed}": linkage(seed) for seed in range(count)} | without_velocity_nodes()
     found = {name: compared(*row, seed) for seed, (name, row) in enumerate(rows.items())}
     worst = {
         each: max((errors[each], name) for name, (errors, *_) in found.items()) for each in ("default", "velocities")

@@ -75,34 +75,12 @@ def bodies(
     return rate
 
 
-def kepler(x: Array, t: float) -> list[float]:
-    cube = (x[0] ** 2 + x[1] ** 2) ** 1.5
-    return [x[2], x[3], -x[0] / cube, -x[1] / cube]
-
-
-def euler(w: Array, t: float) -> Array:
-    inertia = np.array(rotation.INERTIA)
-    return np.cross(inertia * w, w) / inertia
-
-
-def pendulum(x: Array, t: float) -> list[float]:
-    return [x[1], -9.81 * math.sin(x[0])]
-
-
 def kapitza(x: Array, t: float) -> list[float]:
     lift = -0.05 * 150.0**2 * math.cos(150.0 * t)  # the pivot's acceleration upwards
     return [x[1], -(9.81 + lift) * math.sin(x[0])]
 
 
-PENDULA = (
-    "at the upright",
-    "next to the upright",
-    "angle of 1e+08 rad",
-    "angle of 1e+15 rad",
-    "velocity of 10000 rad/s",
-    "velocity of 1e+08 rad/s",
-    "smallest velocity, hanging",
-)
+LET_GO = ("at the upright", "next to the upright", "angle of 1e+08 rad", "angle of 1e+15 rad")
 BY_HAND: dict[str, Rate] = {
     **{f"spring pendulum, k = {k:g}": spring_pendulum(k, 0.0) for k in (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)},
     **{
@@ -118,25 +96,14 @@ BY_HAND: dict[str, Rate] = {
         for r in (1e-12, 1e-8, 1e-4, 1e4, 1e8, 1e12)
     },
     **{f"length ratio {r:g}": bodies([1.0, 1.0], [1.0, r]) for r in (1e-6, 1e6)},
-    **{
-        f"mass matrix of condition {4 / s:.0e}": lambda x, t: [x[2], x[3], -4 * (x[0] + x[1]) + x[1], -x[1]]
-        for s in (1e-4, 1e-8, 1e-12)
-    },
     "massless links with armature": bodies(
         [0.0, 0.0, 1.0], [0.5, 0.5, 0.5], center=[0.0, 0.0, 0.25], inertia=[0.0, 0.0, 0.02], armature=1e-3
     ),
     "100 links": bodies([0.01] * 100, [0.01] * 100),
     "zero gravity": bodies([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], gravity=0.0),
-    **{f"Kepler, e = {e:g}": kepler for e in (0.9, 0.99, 0.999)},
-    "free body about its middle axis, Euler's equations": euler,
-    "charge in a magnetic field": lambda x, t: [x[2], x[3], 10.0 * x[3], -10.0 * x[2]],
     "relativistic oscillator": lambda x, t: [x[1], -x[0] * (1 - x[1] ** 2) ** 1.5],
     "Kapitza's pendulum": kapitza,
-    "damping by a growing mass": lambda x, t: [x[1], -0.5 * x[1] - 4.0 * x[0]],
-    "exponential growth": lambda x, t: [x[0]],
-    "exponential decay": lambda x, t: [-x[0]],
-    **dict.fromkeys(PENDULA, pendulum),
-    "smallest velocity": lambda x, t: [x[1], 0.0],
+    **{f"velocity of {v:g} rad/s": lambda x, t: [x[1], -9.81 * math.sin(x[0])] for v in (1e4, 1e8)},
 }
 BY_TORQUE = {  # Euler angles: tested by the angular momentum they give
     "free body about its middle axis, Euler angles": (rotation.INERTIA, 0.0),
@@ -145,8 +112,8 @@ BY_TORQUE = {  # Euler angles: tested by the angular momentum they give
 TOO_LARGE = {"1000 links"}  # the same builder as of 100
 
 
-def test_every_case_is_checked_by_hand() -> None:
-    assert set(cases.names()) == {*BY_HAND, *BY_TORQUE, *TOO_LARGE}
+def test_every_case_is_checked_by_hand_or_by_its_closed_form() -> None:
+    assert set(cases.names()) == {*BY_HAND, *BY_TORQUE, *CLOSED, *TOO_LARGE}
 
 
 def around(case: StabilityCase, seed: int = 0) -> list[Array]:
@@ -186,8 +153,6 @@ def test_equations_of_a_chain_are_those_written_by_hand() -> None:
 def condition(name: str) -> float:
     """How often the rounding of the mass matrix counts."""
     number = float(re.sub(r".*?([\d.e+-]+)$", r"\1", name)) if name[-1].isdigit() else 1.0
-    if name.startswith("mass matrix of condition"):
-        return number
     if name.startswith("length ratio"):
         return max(number, 1.0) ** 2
     if name.startswith("mass ratio"):
@@ -205,10 +170,6 @@ def terms(name: str, state: Array, expected: Array) -> Array:
         size += float(name.rsplit(" ", 1)[1]) ** 2
     if name.startswith(("mass ratio", "length ratio")) or name.endswith("links"):
         size[:] = np.max(np.abs(expected))
-    if name.startswith("mass matrix"):
-        size += 1.0
-    if name == "angle of 1e+15 rad":
-        size += 9.81
     return size
 
 
@@ -317,7 +278,7 @@ CLOSED: dict[str, Closed] = {
         f"mass matrix of condition {4 / small:.0e}": lambda times: closed_forms.two_modes(times, (1.0, 0.5), (4.0, 1.0))
         for small in (1e-4, 1e-8, 1e-12)
     },
-    **{name: pendulum_from(cases.load(name).q[0]) for name in PENDULA if cases.load(name).q[0] not in (0.0, 0.5)},
+    **{name: pendulum_from(cases.load(name).q[0]) for name in LET_GO},
     "smallest velocity": lambda times: closed_forms.free_fall(times, 0.0, 5e-324, 0.0),
     "smallest velocity, hanging": lambda times: closed_forms.oscillator(times, 0.0, 5e-324, 9.81),
     "charge in a magnetic field": lambda times: closed_forms.cyclotron(times, (0.0, 0.0, 1.0, 0.5), 10.0),

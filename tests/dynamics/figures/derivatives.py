@@ -2,17 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.figure import Figure
 
 from cgraph._shared import Array
 from viz import theme
 from viz.plots.plot import GRID, empty_figure, style
-
-if TYPE_CHECKING:
-    from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
 
 COLORS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE)  # seen on white and on black
 RAMP = (theme.BLUE, theme.PURPLE, theme.ORANGE)  # from little to much, ever lighter, seen on both
@@ -57,9 +55,6 @@ def painted_line(points: Array, values: Array, limits: tuple[float, float], colo
 
     points: (T, 2).  values: (T - 1,), positive.
     """
-    from matplotlib.collections import LineCollection
-    from matplotlib.colors import LinearSegmentedColormap, LogNorm
-
     pieces = np.stack([points[:-1], points[1:]], axis=1)
     ramp = LinearSegmentedColormap.from_list("ramp", list(colors))
     return LineCollection(

@@ -8,7 +8,7 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
-from pytest import approx, mark, raises, warns
+from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
@@ -205,12 +205,6 @@ def test_what_cannot_be_is_refused_by_name(bodies: Any, message: str) -> None:
     with raises(MechanismError, match="^" + re.escape(message)) as caught:
         Mechanism([Body(**(GOOD | bodies))] if isinstance(bodies, dict) else bodies)
     assert "\n" not in str(caught.value)
-
-
-def test_moments_that_no_body_has_are_a_warning() -> None:
-    message = "body 'a': no body has principal moments [1.0, 2.0, 4.0]: the largest exceeds the sum of the others"
-    with warns(dyn.MechanismWarning, match="^" + re.escape(message) + "$"):
-        Mechanism([Body(**(GOOD | {"inertia": (1.0, 2.0, 4.0)}))])
 
 
 def test_gravity_is_a_finite_vector() -> None:

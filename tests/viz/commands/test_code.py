@@ -1,7 +1,6 @@
 """`cgraph code`: files that compute the equations of a scene."""
 
 import math
-import re
 import shutil
 import subprocess
 
@@ -77,18 +76,3 @@ def test_c_is_one_text_or_two_files(tmp_path, capsys):
         (tmp_path / "alone.c").write_text(text, encoding="utf-8")
         for name in ("alone.c", "spring.c"):
             subprocess.run([compiler, "-c", "-Werror", name, "-o", "out.o"], cwd=tmp_path, check=True)
-
-
-@each_row(
-    ("arguments", "said"),
-    [
-        ("--js --out a.c", "--out must end in .mjs for --js, got a.c"),
-        ("--c --out 2.c", "must be a letter"),
-        ("--c --out sin.c", "sin.c names the function: the name of a C function must not be a word of C"),
-    ],
-)
-def test_a_mistake_is_told_in_one_line_and_writes_nothing(arguments, said, here, capsys):
-    assert cli.main(["code", "spring_mass", *arguments.split()]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert re.search(re.escape(said), line)
-    assert list(here.iterdir()) == []

@@ -2,14 +2,11 @@
 
 from pathlib import Path
 
-import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.formulations.formulation_sizes import PAPER, TORQUE, blamed
-from tests.each_row import each_row
+from dynamics.equations.formulations.formulation_sizes import TORQUE, blamed
 from viz import theme
 from viz.graph_drawing.dot import short_formulas
 from viz.graph_drawing.legend import kinds_in, legend_svg
-from viz.models.inspection import inspection
 from viz.pages.document import Document, to_markdown
 from viz.pages.formulation_table import COLORS, TITLES, size_table
 
@@ -20,21 +17,6 @@ def test_the_page_on_the_paper_has_the_table() -> None:
     table = size_table(dyn.formulation_sizes(dyn.scenes.load("spring_mass")))
     text = to_markdown(Document("", [table]))
     assert text[text.index("|  |") :].strip() in (DOCS / "paper.md").read_text(encoding="utf-8")
-
-
-@each_row("name", ["spring_mass", "triple_pendulum"])
-def test_lint_and_the_inspector_count_what_the_table_has(name: str) -> None:
-    scene = dyn.scenes.load(name)
-    sizes = {formulation: size for (term, formulation), size in dyn.formulation_sizes(scene).items() if term == TORQUE}
-    graph = dyn.inverse_dynamics(scene, "by_definition")
-    n = scene.system.n
-    report = cg.lint(graph, independent=[([f"q{i}" for i in range(n)], [f"qd{i}" for i in range(n)])])
-    size = sizes["by_definition"]
-    assert len(report.findings[0].data["nodes_for_this_alone"]) == size.spurious_nodes
-    assert f"{size.spurious_nodes} nodes of {size.nodes} serve nothing else" in str(report)
-    versions = inspection(scene, t_end=0.1).versions
-    shown = {name: (len(each.graph.nodes), len(each.marked)) for name, each in versions.items() if name in sizes}
-    assert shown == {name: (sizes[name].nodes, sizes[name].spurious_nodes) for name in PAPER}
 
 
 def test_an_edge_that_is_there_by_mistake_starts_at_such_a_node_or_enters_what_is_right() -> None:

@@ -88,15 +88,6 @@ def test_what_is_beyond_its_bound_is_drawn_in_the_color_of_what_is_wrong() -> No
     assert [label.get_text() for label in axis.get_yticklabels()] == [each["case"] for each in ROWS]
 
 
-def test_a_report_of_nothing_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments, told in (
-        ([], "needs a scene"),
-        (["chain", "--stability"], "--stability takes no scene, got 'chain'"),
-    ):
-        assert cli.main(["report", *arguments]) == 2
-        assert told in capsys.readouterr().err
-
-
 def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:

@@ -1,7 +1,5 @@
 """The check: the torque right beside wrong, at rest, where the answer is known, and at a state that a student chooses."""
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np

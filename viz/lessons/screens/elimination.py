@@ -1,7 +1,5 @@
 """Elimination, the last unknown first: what a joint feels of all that is beyond it."""
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The Euler edge: a step of time inside the graph, by which a velocity reaches its coordinate."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from cgraph import Graph, Node, constant, variable

@@ -46,7 +46,8 @@ def formula_graph(subject: Subject) -> Screen:
     (other,) = subject.evaluate(graph, **{name: subject.values[name] - PUSH})
     size = max(abs(float(each)) for each in (before, after, other))
     changes = max(abs(after - before), abs(other - before)) > 1e-12 * size
-    reached = name in {node.name for node in graph.nodes if not node.args and node in _used(graph)}
+    used = [edge.source for edge in graph.edges] + list(graph.outputs.values())
+    reached = name in {node.name for node in used if not node.args}
     shown = f"<b>{subject.told(name)}</b>"
     why = (
         f"<p>Edges lead from {shown} up to L, so its value takes part. L goes from {number(before)} to {number(after)}.</p>"
@@ -216,10 +217,6 @@ def _told_picture(graph: Graph) -> str:
     many = len(graph.nodes) > DRAWN
     told = "the same lesson on a two-link arm, <code>cgraph lesson</code>, has one"
     return f"<p>With {len(graph.nodes)} nodes the graph is too large for a picture here; {told}.</p>" if many else ""
-
-
-def _used(graph: Graph) -> set[Node]:
-    return {edge.source for edge in graph.edges} | set(graph.outputs.values())
 
 
 def _picture(subject: Subject, graph: Graph, name: str) -> str:

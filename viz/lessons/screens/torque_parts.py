@@ -1,12 +1,9 @@
 """Parts of a torque: what of it vanishes with q̈, what with q̇, and what remains at rest."""
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np
 
-from cgraph._shared import Array
 from dynamics import inverse_dynamics
 
 from ...pages.document import Table
@@ -21,13 +18,17 @@ MOVED = 3  # joints with three sliders
 def torque_parts(subject: Subject) -> Screen:
     """The screen of a system."""
     graph = inverse_dynamics(subject.system, "chain_rule")
-    parts = _parts(subject)
+    still = {f"qd{i}": 0.0 for i in range(subject.system.n)}
+    steady = {f"qdd{i}": 0.0 for i in range(subject.system.n)}
+    held = subject.evaluate(graph, **still, **steady)
+    parts = np.stack([subject.evaluate(graph, **still) - held, subject.evaluate(graph, **steady) - held, held])
     joint = int(np.abs(parts).sum(axis=0).argmax())
     sizes = np.abs(parts[:, joint])
     name = escape(subject.joints[joint])
     rows = [[joint_name, *[number(value) for value in column], number(column.sum())]
             for joint_name, column in zip(subject.joints[:SHOWN], parts.T, strict=False)]  # fmt: skip
     table = Table("Parts of τ", [subject.joint, "inertia", "velocity", "position", "τ"], rows)
+    each = "the coordinate" if subject.system.n == 1 else f"each {subject.joint}"
     play = subject.play(
         "parts",
         {"graph": graph},
@@ -41,7 +42,7 @@ def torque_parts(subject: Subject) -> Screen:
         "Why this large?",
         3,
         f"<p>In the moment that the lesson began with, the system moves. The {term('generalized force', subject.force)} τ that "
-        f"drives {_each(subject)} has three parts that add up: <b>inertia</b>, which vanishes with q̈; what the <b>velocity</b> does, which vanishes "
+        f"drives {each} has three parts that add up: <b>inertia</b>, which vanishes with q̈; what the <b>velocity</b> does, which vanishes "
         "with q̇; and what the <b>position</b> does, which remains at rest.</p>",
         f"Which part is the largest at <b>{name}</b> in this moment?",
         PARTS,
@@ -53,16 +54,3 @@ def torque_parts(subject: Subject) -> Screen:
         "light blue, velocity orange, position green.",
         play,
     )
-
-
-def _each(subject: Subject) -> str:
-    return "the coordinate" if subject.system.n == 1 else f"each {subject.joint}"
-
-
-def _parts(subject: Subject) -> Array:
-    """The three parts at each joint, (3, n)."""
-    graph = inverse_dynamics(subject.system, "chain_rule")
-    still = {f"qd{i}": 0.0 for i in range(subject.system.n)}
-    steady = {f"qdd{i}": 0.0 for i in range(subject.system.n)}
-    held = subject.evaluate(graph, **still, **steady)
-    return np.stack([subject.evaluate(graph, **still) - held, subject.evaluate(graph, **steady) - held, held])

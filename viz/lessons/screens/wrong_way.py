@@ -1,7 +1,5 @@
 """The wrong way: the slope of L by a velocity takes a second path, and what is left of it as dt tends to 0."""
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cases: the rows of the stability table, models with a start, a horizon, what to watch and a bound to meet."""
 
-from __future__ import annotations
-
 from cgraph._shared import memo
 
 from ...accuracy_task import RTOL, Criterion, StabilityCase

@@ -1,7 +1,5 @@
 """Extremes of a pendulum's state: upright, angles up to 10^15 rad, velocities from the smallest number to 10^8."""
 
-from __future__ import annotations
-
 import math
 
 import cgraph as cg

@@ -1,18 +1,11 @@
 """Orbits: Kepler's problem with large eccentricity over many turns."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Sequence
 
 import cgraph as cg
 
 from ....systems.system import System
 from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
-
-
-def _lagrangian(q: Sequence[cg.Node], qd: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:
-    return [0.5 * (qd[0] ** 2 + qd[1] ** 2), 1.0 / cg.hypot(q[0], q[1])]
 
 
 def kepler(eccentricity: float, orbits: float, growth: float) -> StabilityCase:
@@ -21,7 +14,7 @@ def kepler(eccentricity: float, orbits: float, growth: float) -> StabilityCase:
     return StabilityCase(
         name=f"Kepler, e = {eccentricity:g}",
         about=f"{orbits:g} orbits with a close passage each: the step must change by (1 - e)^1.5",
-        model=System(_lagrangian, ["x", "y"]),
+        model=System(lambda q, qd, t: [0.5 * (qd[0] ** 2 + qd[1] ** 2), 1.0 / cg.hypot(q[0], q[1])], ["x", "y"]),
         q=start[:2],
         qd=start[2:],
         t_end=2.0 * math.pi * orbits,
