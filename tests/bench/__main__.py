@@ -10,16 +10,18 @@ from dataclasses import asdict
 from typing import Any
 
 from dynamics.experiments.timing import machine
+from dynamics.integrators import METHODS
 from viz.commands.arguments import IN_PYTHON, READING, listed, positive, reading, reads_files, whole
 
 from .benches import BENCHES, SPEED, Bench
 from .motions.motion_scenes import MOTIONS
 from .motions.trajectory_peers import PEERS as MOTION_PEERS
 from .speed import bench as speed
+from .tables import Wrong
 
-LISTS = {"tasks": speed.TASKS, "modes": speed.MODES, "peers": speed.PEERS}
-NUMBERS = {"links": "links of the models", "repeats": "turns", "count": "trajectories, or states"}
-OPTIONS = (*READING, *LISTS, "quick", "budget", "repeats", "times", "errors", "count", "links")
+LISTS = {"tasks": speed.TASKS, "modes": speed.MODES, "peers": speed.PEERS, "methods": METHODS}
+NUMBERS = {"links": "links of the models", "repeats": "turns", "count": "trajectories, states or cases"}
+OPTIONS = (*READING, *LISTS, *NUMBERS, "quick", "budget", "times", "errors", "seed", "cases")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -52,6 +54,8 @@ def parser() -> argparse.ArgumentParser:
     result.add_argument(
         "--budget", type=positive, metavar="S", help="seconds a peer may take to make one task (default: 60; quick: 20)"
     )
+    result.add_argument("--seed", type=whole, metavar="N", help="of hybrid: of the first case")
+    result.add_argument("--cases", action="store_true", help="of hybrid: members of faults that were found, by name")
     result.add_argument("--json", action="store_true", help="print as JSON")
     for name, about in NUMBERS.items():
         result.add_argument(f"--{name}", type=whole, metavar="N", help=f"{about}, for the figures that take it")
@@ -73,8 +77,11 @@ def say(line: str) -> None:
     print(f"bench: {line}", file=sys.stderr, flush=True)
 
 
-def run(options: argparse.Namespace) -> None:
-    """Print one figure: tables as they are measured, or at the end; of a run that is interrupted, what it has."""
+def run(options: argparse.Namespace) -> int:
+    """Print one figure: tables as they are measured, or at the end; of a run that is interrupted, what it has.
+
+    1 where something is wrong.
+    """
     name, scenes = SPEED, options.what
     if scenes and scenes[0] in BENCHES:
         name, *scenes = scenes
@@ -93,11 +100,11 @@ def run(options: argparse.Namespace) -> None:
         chosen["say"] = say
     if "ignore" in bench.takes:
         chosen["reading"] = reading(options)
-    show(options, bench, chosen)
+    return int(any([isinstance(part, Wrong) for part in show(options, bench, chosen)]))
 
 
-def show(options: argparse.Namespace, bench: Bench, chosen: dict[str, Any]) -> None:
-    """Print what a bench has measured."""
+def show(options: argparse.Namespace, bench: Bench, chosen: dict[str, Any]) -> list[Any]:
+    """What a bench has measured, printed."""
     found: list[Any] = []
     at_once, complete = not (options.json or bench.rows), False
     try:
@@ -120,19 +127,19 @@ def show(options: argparse.Namespace, bench: Bench, chosen: dict[str, Any]) -> N
             print(json.dumps({"machine": machine(), "complete": complete, "rows": plain}, indent=1))
         elif found and bench.rows:
             print(bench.module.tables(found, machine()))
+    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one figure; 0 where it was measured, 2 for a wrong choice, 130 for Ctrl-C."""
+    """Run one figure; 0 where it was measured, 1 where that is wrong, 2 for a wrong choice, 130 for Ctrl-C."""
     options = parser().parse_intermixed_args(arguments)
     try:
-        run(options)
+        return run(options)
     except KeyboardInterrupt:
         return 130
     except (ValueError, OSError, ImportError, RuntimeError, ArithmeticError) as error:
         say(f"error: {' '.join(str(error).split())}")
         return 2
-    return 0
 
 
 if __name__ == "__main__":

@@ -77,6 +77,11 @@ BENCHES = {
         "trust.tightest.tightest",
         ("count",),
     ),
+    "hybrid": Bench(
+        "random systems with switching surfaces: ends, events and slopes right, said to be wrong, silent",
+        "bench.hybrid.hybrid",
+        ("count", "seed", "methods", "cases"),
+    ),
     "orders": Bench("fitted orders of the methods of equal steps", f"{COMPARED}.orders"),
     "taylor": Bench(
         "the three-link arm to 10 s at 1e-12 beside heyoka and CVODES, and cold starts", f"{COMPARED}.taylor"

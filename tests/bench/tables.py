@@ -46,3 +46,7 @@ class Footnotes:
     def lines(self) -> list[str]:
         """A line for each reason."""
         return [f"{letter}: {reason}" for reason, letter in self._letters.items()]
+
+
+class Wrong(str):
+    """A line about what must not be: the exit code tells it, too."""
