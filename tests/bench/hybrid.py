@@ -130,11 +130,12 @@ def sensitivities(model: Any, start: Any, method: str, names: Sequence[str], **o
 
 
 def random_verdicts(count: int, seed: int, methods: Sequence[str]) -> Iterator[Verdict]:
-    """The verdicts on cases of these seeds, by these methods, or by the default and another, slopes in turns."""
+    """The verdicts on cases of these seeds, by these methods; or by the default and another, slopes by one of them."""
     for each in range(seed, seed + count):
-        found, turn, ways = drawn(each), each // len(FAMILIES), (gradient, sensitivities)
-        for k, method in enumerate(methods or ("dop853", OTHERS[turn % len(OTHERS)])):
-            asked = ways if methods else ways[turn // 2 % 2 :][: (turn + k + 1) % 2]
+        found, u, ways = drawn(each), Draw(each), (gradient, sensitivities)
+        pair, sloped, way = ("dop853", OTHERS[u.pick(len(OTHERS))]), u.pick(2), ways[u.pick(2)]
+        for k, method in enumerate(methods or pair):
+            asked = ways if methods else (way,) * (k == sloped)
             again = f"--seed {each} --count 1 --methods {method}"
             yield from judged(found, FAMILIES[each % len(FAMILIES)], again, method, asked)
 
