@@ -5,7 +5,7 @@ OUT ?= paper
 WORKERS ?= 2
 WORST ?= 15
 FIGURES ?= speed motions counts operations build compile long-chains agreement ensembles closed-chains reconfiguration trust \
-	tightest orders taylor stiff loops energy
+	tightest hybrid
 
 BIN = $(VENV)/bin
 LOCKED = .venv-locked/bin

@@ -39,7 +39,7 @@ class Bench(NamedTuple):
 READING = ("ignore", "floating", "limits", "friction", "actuators", "contacts")
 OF_SPEED = (*READING, "tasks", "modes", "peers", "quick", "budget", "repeats")
 OF_MOTIONS = ("times", "errors", "peers", "quick", "repeats", "count")
-SIDE, STAGES, COMPARED = "bench.speed.beside_peers", "bench.speed.stages", "bench.motions.comparisons"
+SIDE, STAGES = "bench.speed.beside_peers", "bench.speed.stages"
 # fmt: off   (a table is read by columns)
 BENCHES = {
     SPEED: Bench("run times of tasks beside other software (default)", "bench.speed.bench.bench", OF_SPEED, rows=True),
@@ -82,14 +82,5 @@ BENCHES = {
         "bench.hybrid.hybrid",
         ("count", "seed", "methods", "cases"),
     ),
-    "orders": Bench("fitted orders of the methods of equal steps", f"{COMPARED}.orders"),
-    "taylor": Bench(
-        "the three-link arm to 10 s at 1e-12 beside heyoka and CVODES, and cold starts", f"{COMPARED}.taylor"
-    ),
-    "stiff": Bench(
-        "steps and times on a stiff spring, Van der Pol's oscillator and Robertson's reaction", f"{COMPARED}.stiff"
-    ),
-    "loops": Bench("the native loop beside SciPy's solve_ivp on three rates", f"{COMPARED}.loops"),
-    "energy": Bench("drift of the energy over a million steps from a dozen starts", f"{COMPARED}.energy"),
 }
 # fmt: on

@@ -83,6 +83,8 @@ class Motion:
         held = [j for j, sign in enumerate(signs) if sign == 0]
         if not held:
             return matrix, {}
+        if max([np.abs(self.parts[j][:, :-1]).max() for j in held]) > SMALL:
+            raise ZeroDivisionError  # the rate has a kink there, and no jump
         effects = np.stack([self.parts[j][:, -1] for j in held], axis=1)
         shares = solve(self.surfaces[held] @ effects, -(self.surfaces[held] @ matrix))
         return matrix + effects @ shares, dict(zip(held, shares, strict=True))
@@ -146,8 +148,11 @@ class Motion:
         if not len(below):
             self.y = series(matrix, self.y, left)
             return False
-        before = series(matrix, self.y, step * (stop - 1))
-        roots = {self._root(matrix, before, rows[j], step): j for j in np.flatnonzero(values[stop] < 0.0)}
+        start = max(stop - 2, 0)  # where it is surely positive
+        before = series(matrix, self.y, step * start)
+        roots = {
+            self._root(matrix, before, rows[j], step * (stop - start)): j for j in np.flatnonzero(values[stop] < 0.0)
+        }
         self.y = series(matrix, before, min(roots))
         found = roots[min(roots)]
         steep = abs(float(rows[found] @ matrix @ self.y)) * float(self.t_end) > POOR * largest[found]

@@ -21,7 +21,7 @@ from dynamics.systems.arguments import TIME
 from dynamics.verification.residual import UnavailableError
 from tests.bench.peers import PeerModel
 from tests.bench.peers.casadi import casadi, our_function
-from tests.bench.peers.heyoka import expressions, heyoka
+from tests.bench.peers.heyoka import heyoka
 from tests.bench.peers.mujoco import MujocoPeer, rollout
 from tests.bench.peers.translate import translated
 
@@ -64,26 +64,19 @@ class EndSolver(Solver):
 
 
 class Scipy(EndSolver):
-    """One of SciPy's solvers, by `solve_ivp`, on our compiled rate and Jacobian, or on another rate.
+    """One of SciPy's solvers, by `solve_ivp`, on our compiled rate and Jacobian.
 
     Raises ImportError without SciPy.
     """
 
     tolerances = tuple([10.0**-k for k in range(3, 14)])  # it takes none smaller than 2e-14
 
-    def __init__(
-        self,
-        solver: str,
-        task: AccuracyTask,
-        smallest: float,
-        problem: Problem,
-        rate: Callable[[float, Array], object] | None = None,
-    ) -> None:
+    def __init__(self, solver: str, task: AccuracyTask, smallest: float, problem: Problem) -> None:
         from scipy.integrate import solve_ivp
 
         super().__init__(SCIPY + solver, task, smallest)
         self.solve, self.order, compiled = solve_ivp, ORDERS[solver], cg.compile(problem.rate)
-        self.rate = rate or (lambda t, x: compiled([*x, t]))
+        self.rate = lambda t, x: compiled([*x, t])
         self.options: dict[str, Any] = {"method": solver}
         if solver in IMPLICIT:
             self.options["jac"] = lambda t, x: compiled.jacobian([*x, t])[:, : problem.size]
@@ -139,16 +132,15 @@ class Mujoco(EndSolver):
 
 
 class Heyoka(EndSolver):
-    """heyoka's adaptive Taylor series on our equations, node for node.  derivatives: on its own in their place."""
+    """heyoka's adaptive Taylor series on our equations, node for node."""
 
     tolerances = (1e-4, 1e-7, 1e-10, 1e-12, EPSILON)  # each is compiled anew; the last is its default
 
-    def __init__(self, task: AccuracyTask, smallest: float, problem: Problem, derivatives: bool = False) -> None:
+    def __init__(self, task: AccuracyTask, smallest: float, problem: Problem) -> None:
         self.compact = len(problem.rate.nodes) > COMPACT
         super().__init__("heyoka Taylor", task, smallest)
         self.heyoka = heyoka()
-        hy = self.heyoka
-        self.system = heyoka_derivatives(hy, task) if derivatives else heyoka_equations(hy, problem)
+        self.system = heyoka_equations(self.heyoka, problem)
         self._made: dict[float, taylor_adaptive] = {}
 
     def integrator(self, knob: float) -> taylor_adaptive:
@@ -225,17 +217,6 @@ def heyoka_equations(
     values = translated(graph.nodes, env, functions, number=number)
     states = [env[node] for node in graph.inputs[: problem.size]]
     return list(zip(states, [hy.expression(values[rate]) for rate in graph.outputs.values()], strict=True))
-
-
-def heyoka_derivatives(hy: ModuleType, task: AccuracyTask) -> list[tuple[expression, expression]]:
-    """heyoka's own equations, from the Lagrangian. Raises UnavailableError for what it cannot derive."""
-    if not task.mechanical:
-        raise UnavailableError("derives equations of a Lagrangian alone")
-    case = PeerModel(task.name, task.model)
-    rates, inputs = expressions(case, "forward")
-    rates = hy.subs(rates, {f"last_{i}": hy.expression(0.0) for i in range(case.n)})
-    state = inputs[: 2 * case.n]
-    return list(zip(state, [*state[case.n :], *rates], strict=True))
 
 
 def casadi_equations(ca: ModuleType, problem: Problem) -> dict[str, SX]:
