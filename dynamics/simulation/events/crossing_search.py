@@ -21,13 +21,11 @@ from cgraph._shared import Array, kept_by_first, memo
 from cgraph.extend import enclosure
 
 from ..steps.dense_output import UNIT, Indices, StepBlock
-from ..steps.row_values import values_of
 
 MOST_CELLS = 4096  # that wait at once
 SHORTEST = 2.0**-50  # of a step, a cell
 LEFT = 1e-3  # of the largest that a quantity is in a step, by which it has left zero
-PARTS = 32  # into which a cell is divided again and again to find a root
-BITS = 56.0  # of where in a cell
+PARTS = 32  # of the first step, at whose ends a quantity that begins at zero is looked at
 DEGREES = 8  # of dense output, whose matrices are kept
 MANY_NODES = 150  # of a graph that is compiled
 
@@ -74,21 +72,43 @@ def quantities(graph: Graph, m: int) -> Quantities:
 
 
 @kept_by_first
-def _function(graph: Graph) -> Callable[[Array], Array]:
-    """The outputs (k, N) at points (inputs, N)."""
+def _function(graph: Graph, *, numbers: bool) -> Callable[[Any], Any]:
+    """The outputs (k, N) at points (inputs, N), or the k numbers at one point: of small graphs without code."""
     if len(graph.nodes) > MANY_NODES:
-        return cg.compile(graph).batch
-    return lambda points: values_of(graph, [*points], points.shape[1])
+        return cg.compile(graph) if numbers else cg.compile(graph).batch
+    place = {node: k for k, node in enumerate(graph.inputs)}
+    constants, steps = list[float](), list[tuple[Callable[..., Any], list[int]]]()
+    for node in [node for node in graph.nodes if node.value is not None]:
+        place[node] = len(graph.inputs) + len(constants)
+        constants.append(node.value)  # type: ignore[arg-type]
+    for node in [node for node in graph.nodes if node.args]:
+        place[node] = len(place)
+        steps.append((node.op.scalar if numbers else node.op.array, [place[arg] for arg in node.args]))
+    wanted = [place[node] for node in graph.outputs.values()]
+
+    def values(points: Any) -> Any:
+        known = [*points, *constants]
+        for function, slots in steps:
+            known.append(function(*[known[slot] for slot in slots]))
+        if numbers:
+            return [known[slot] for slot in wanted]
+        result = np.empty((len(wanted), points.shape[1]))
+        for row, slot in zip(result, wanted, strict=True):
+            row[:] = known[slot]
+        return result
+
+    return values
 
 
 def outputs_of(graph: Graph, *parts: Any) -> Array:
     """Outputs (k, N) of a graph at inputs that go along the last axis, or are the same at all points."""
-    width = max([np.shape(part)[-1] for part in parts if np.ndim(part) == 2])
-    rows = [
-        np.broadcast_to(np.reshape(part, (-1, 1)) if np.ndim(part) < 2 else part, (len(part), width)) for part in parts
-    ]
+    points = np.empty((len(graph.inputs), max([part.shape[-1] for part in parts if np.ndim(part) == 2])))
+    first = 0
+    for part in parts:
+        points[first : first + len(part)] = part if np.ndim(part) == 2 else np.reshape(part, (-1, 1))
+        first += len(part)
     with np.errstate(all="ignore"):
-        return np.asarray(_function(graph)(np.concatenate(rows)))
+        return np.asarray(_function(graph, numbers=False)(points))
 
 
 class Cells(NamedTuple):
@@ -117,32 +137,32 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
     fresh: (k,), of a quantity that begins at zero how far it is rounding; it counts as positive until it has left that
     in the first step; NaN of the others.
     """
-    rows = np.arange(len(block.t))
+    rows, best = np.arange(len(block.t)), None
     low = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))[: len(fresh)]
     which, number = np.nonzero(~(low > 0.0).T)
     begins = np.where(which == 0, _left_at(watched, p, block, fresh)[number], 0.0)
     cells = Cells(which, begins, np.ones(len(which)), number).take(begins < 1.0)
-    best: Crossing | None = None
     while len(cells.rows):
-        own = (cells.number, np.arange(len(cells.rows)))
-        k = len(fresh)
-        boxes = outputs_of(watched.bounds, p, *_hulls(block, cells.rows, cells.a, cells.b))
         tangents = _tangents(block, cells)
-        slopes = outputs_of(watched.slope_bounds, p, *tangents)
-        rises, falls = slopes[:k][own] >= 0.0, slopes[k:][own] <= 0.0
-        before, after = [_values(watched, p, block, cells.rows, s)[own] for s in (cells.a, cells.b)]
-        clear = boxes[:k][own] > 0.0
-        single = (rises | falls) & np.isfinite(boxes[k:][own] - boxes[:k][own])  # a pole is no zero
+        boxes, slopes = [
+            [np.take_along_axis(half, cells.number[None], axis=0)[0] for half in np.split(found, 2)]
+            for found in (
+                outputs_of(watched.bounds, p, *[ends[: watched.size + 1] for ends in tangents]),
+                outputs_of(watched.slope_bounds, p, *tangents),
+            )
+        ]
+        ends = _values(watched, p, block, np.tile(cells.rows, 2), np.concatenate([cells.a, cells.b]))
+        before, after = np.split(np.take_along_axis(ends, np.tile(cells.number, 2)[None], axis=0)[0], 2)
+        clear = boxes[0] > 0.0
+        single = ((slopes[0] >= 0.0) | (slopes[1] <= 0.0)) & np.isfinite(boxes[1] - boxes[0])  # a pole is no zero
         last = cells.b - cells.a <= SHORTEST
-        passes = ~clear & (single | last) & ((after < 0.0) | (before < 0.0))
-        for each in np.flatnonzero(passes):
-            at = (int(cells.rows[each]), float(cells.a[each]))
-            if best is not None and at >= best[:2]:
-                continue
-            n = int(cells.number[each])
-            s = at[1] if before[each] < 0.0 else _root(watched, p, block, *at, float(cells.b[each]), n)
-            if best is None or (at[0], s) < best[:2]:
-                best = Crossing(at[0], s, n)
+        passes = np.flatnonzero(~clear & (single | last) & ((after < 0.0) | (before < 0.0)))
+        for each in passes[np.lexsort((cells.a[passes], cells.rows[passes]))].tolist():
+            row, at, n = int(cells.rows[each]), float(cells.a[each]), int(cells.number[each])
+            if best is not None and (row, at) >= best[:2]:
+                break
+            s = at if before[each] < 0.0 else _root(watched, p, block, row, at, float(cells.b[each]), n)
+            best = Crossing(row, s, n) if best is None or (row, s) < best[:2] else best
         split = ~(clear | single | last)
         if best is not None:
             split &= (cells.rows < best.row) | ((cells.rows == best.row) & (cells.a < best.s))
@@ -181,18 +201,46 @@ def _left_at(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> A
 
 
 def _values(watched: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:
-    return outputs_of(watched.values, block.states_at(rows, s).T, block.times_at(rows, s)[None], p)
+    return outputs_of(watched.values, block.polynomials_at(rows, s).T, block.times_at(rows, s)[None], p)
 
 
 def _root(watched: Quantities, p: Array, block: StepBlock, row: int, low: float, high: float, number: int) -> float:
-    """The first share of a step, to the last bit, at which a quantity that falls is below zero."""
-    for _ in range(math.ceil(BITS / math.log2(PARTS))):
-        s = np.linspace(low, high, PARTS + 1)
-        below = _values(watched, p, block, np.full(len(s), row), s)[number] < 0.0
-        below[0], below[-1] = False, True
-        at = int(np.argmax(below))
-        low, high = float(s[at - 1]), float(s[at])
-    return high
+    """The first share of a step, but for rounding, at which a quantity that falls is below zero (Chandrupatla 1997)."""
+    assert block.dense is not None
+    powers, start = block.dense[row][::-1], block.x_old[row]
+    t, h, fixed, function = (
+        float(block.t_old[row]),
+        float(block.h[row]),
+        p.tolist(),
+        _function(watched.values, numbers=True),
+    )
+
+    def value(s: float) -> float:
+        x = np.zeros_like(start)
+        for coefficients in powers:
+            x = (x + coefficients) * s
+        return float(function([*(start + x).tolist(), t + s * h, *fixed])[number])
+
+    a, b, f_a, f_b = low, high, value(low), value(high)
+    if not f_b < 0.0:
+        return high
+    c, f_c, share = a, f_a, 0.5
+    while abs(b - a) > 2.0 * UNIT * max(abs(a), abs(b)):
+        s = a + share * (b - a)
+        f = value(s)
+        if (f < 0.0) == (f_a < 0.0):
+            c, f_c = a, f_a
+        else:
+            c, f_c, b, f_b = b, f_b, a, f_a
+        a, f_a = s, f
+        # inverse quadratic interpolation where that is safe, and no step below rounding
+        xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b) if f_c != f_b else 0.5
+        share = 0.5
+        if phi * phi < xi and (1.0 - phi) * (1.0 - phi) < 1.0 - xi and f_c != f_a and f_b != f_a:
+            share = f_a / (f_b - f_a) * f_c / (f_b - f_c) + (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+        least = min(0.5, UNIT * max(abs(a), abs(b)) / abs(b - a)) if b != a else 0.5
+        share = min(max(share, least), 1.0 - least)
+    return a if f_a < 0.0 else b
 
 
 @memo(DEGREES)
