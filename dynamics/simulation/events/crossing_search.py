@@ -8,7 +8,7 @@ it, or it is halved.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -27,7 +27,7 @@ SHORTEST = 2.0**-50  # of a step, a cell
 LEFT = 1e-3  # of the largest that a quantity is in a step, by which it has left zero
 PARTS = 32  # of the first step, at whose ends a quantity that begins at zero is looked at
 DEGREES = 8  # of dense output, whose matrices are kept
-MANY_NODES = 150  # of a graph that is compiled
+OFTEN = 200  # calls of a graph, which take about as long as to compile it
 
 
 class Crossing(NamedTuple):
@@ -60,6 +60,10 @@ class Quantities:
         """The same of the slopes."""
         return enclosure(self.slopes, exact=self._parameters)
 
+    def part(self, number: int) -> Quantities:
+        """One of them."""
+        return _part(self, number)
+
     @property
     def _parameters(self) -> list[str]:
         return list(self.values.input_names[self.size + 1 :])
@@ -72,30 +76,52 @@ def quantities(graph: Graph, m: int) -> Quantities:
 
 
 @kept_by_first
-def _function(graph: Graph, *, numbers: bool) -> Callable[[Any], Any]:
-    """The outputs (k, N) at points (inputs, N), or the k numbers at one point: of small graphs without code."""
-    if len(graph.nodes) > MANY_NODES:
-        return cg.compile(graph) if numbers else cg.compile(graph).batch
-    place = {node: k for k, node in enumerate(graph.inputs)}
-    constants, steps = list[float](), list[tuple[Callable[..., Any], list[int]]]()
-    for node in [node for node in graph.nodes if node.value is not None]:
-        place[node] = len(graph.inputs) + len(constants)
-        constants.append(node.value)  # type: ignore[arg-type]
-    for node in [node for node in graph.nodes if node.args]:
-        place[node] = len(place)
-        steps.append((node.op.scalar if numbers else node.op.array, [place[arg] for arg in node.args]))
-    wanted = [place[node] for node in graph.outputs.values()]
+def _part(watched: Quantities, number: int) -> Quantities:
+    name, node = list(watched.values.outputs.items())[number]
+    return Quantities(Graph(watched.values.inputs, {name: node}), watched.size)
 
-    def values(points: Any) -> Any:
-        known = [*points, *constants]
-        for function, slots in steps:
-            known.append(function(*[known[slot] for slot in slots]))
-        if numbers:
-            return [known[slot] for slot in wanted]
-        result = np.empty((len(wanted), points.shape[1]))
-        for row, slot in zip(result, wanted, strict=True):
-            row[:] = known[slot]
+
+class _Batch:
+    """The outputs (k, N) of a graph at points (inputs, N), operation by operation; often asked, by machine code."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph, self._calls = graph, 0
+        self._function: Callable[[Array], Array] | None = None
+
+    def __call__(self, points: Array) -> Array:
+        """The outputs."""
+        self._calls += 1
+        if self._calls == OFTEN:
+            self._function = cg.compile(self._graph).batch
+        if self._function is not None:
+            return self._function(points)
+        result = np.empty((len(self._graph.outputs), points.shape[1]))
+        for row, value in zip(result, _operations(self._graph, numbers=False)(points), strict=True):
+            row[:] = value
         return result
+
+
+_batch = kept_by_first(_Batch)
+
+
+@kept_by_first
+def _operations(graph: Graph, *, numbers: bool) -> Callable[[Iterable[Any]], list[Any]]:
+    """The outputs at numbers, or at arrays, operation by operation."""
+    leaves = [*graph.inputs, *[node for node in graph.nodes if node.value is not None]]
+    made = [node for node in graph.nodes if node.args]
+    place = {node: k for k, node in enumerate([*leaves, *made])}
+    constants = [node.value for node in leaves[len(graph.inputs) :]]
+    functions = [node.op.scalar if numbers else node.op.array for node in made]
+    slots, wanted = (
+        [[place[arg] for arg in node.args] for node in made],
+        [place[node] for node in graph.outputs.values()],
+    )
+
+    def values(inputs: Iterable[Any]) -> list[Any]:
+        known = [*inputs, *constants]
+        for function, arguments in zip(functions, slots, strict=True):
+            known.append(function(*[known[slot] for slot in arguments]))
+        return [known[slot] for slot in wanted]
 
     return values
 
@@ -108,27 +134,14 @@ def outputs_of(graph: Graph, *parts: Any) -> Array:
         points[first : first + len(part)] = part if np.ndim(part) == 2 else np.reshape(part, (-1, 1))
         first += len(part)
     with np.errstate(all="ignore"):
-        return np.asarray(_function(graph, numbers=False)(points))
-
-
-class Cells(NamedTuple):
-    """Parts of steps, from share a to share b, and the quantity that each is of, (n,) each."""
-
-    rows: Indices
-    a: Array
-    b: Array
-    number: Indices
-
-    def take(self, which: Any) -> Cells:
-        """Subset of the cells."""
-        return Cells._make([array[which] for array in self])
+        return _batch(graph)(points)
 
 
 def steps_near_zero(watched: Quantities, p: Array, block: StepBlock) -> list[int]:
     """Steps in which quantities may not be positive."""
     rows = np.arange(len(block.t))
     bounds = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))
-    return list(np.flatnonzero(~(bounds[: len(bounds) // 2] > 0.0).all(axis=0)).tolist())
+    return list(np.flatnonzero(~(bounds[: len(bounds) // 2] >= 0.0).all(axis=0)).tolist())
 
 
 def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> tuple[Crossing | None, bool]:
@@ -137,74 +150,98 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
     fresh: (k,), of a quantity that begins at zero how far it is rounding; it counts as positive until it has left that
     in the first step; NaN of the others.
     """
-    rows, best = np.arange(len(block.t)), None
+    rows, best, is_sure = np.arange(len(block.t)), None, True
     low = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))[: len(fresh)]
-    which, number = np.nonzero(~(low > 0.0).T)
-    begins = np.where(which == 0, _left_at(watched, p, block, fresh)[number], 0.0)
-    cells = Cells(which, begins, np.ones(len(which)), number).take(begins < 1.0)
-    while len(cells.rows):
-        tangents = _tangents(block, cells)
-        boxes, slopes = [
-            [np.take_along_axis(half, cells.number[None], axis=0)[0] for half in np.split(found, 2)]
-            for found in (
-                outputs_of(watched.bounds, p, *[ends[: watched.size + 1] for ends in tangents]),
-                outputs_of(watched.slope_bounds, p, *tangents),
-            )
-        ]
-        ends = _values(watched, p, block, np.tile(cells.rows, 2), np.concatenate([cells.a, cells.b]))
-        before, after = np.split(np.take_along_axis(ends, np.tile(cells.number, 2)[None], axis=0)[0], 2)
-        clear = boxes[0] > 0.0
-        single = ((slopes[0] >= 0.0) | (slopes[1] <= 0.0)) & np.isfinite(boxes[1] - boxes[0])  # a pole is no zero
-        last = cells.b - cells.a <= SHORTEST
-        passes = np.flatnonzero(~clear & (single | last) & ((after < 0.0) | (before < 0.0)))
-        for each in passes[np.lexsort((cells.a[passes], cells.rows[passes]))].tolist():
-            row, at, n = int(cells.rows[each]), float(cells.a[each]), int(cells.number[each])
-            if best is not None and (row, at) >= best[:2]:
+    doubtful, number = np.nonzero(~(low >= 0.0).T)
+    for n in dict.fromkeys(number.tolist()):
+        where = doubtful[number == n]
+        a = np.where(where == 0, _left_at(watched.part(n), p, block, fresh[n]), 0.0)
+        found, sure = _first_zero(watched.part(n), p, block, where[a < 1.0], a[a < 1.0], best)
+        best, is_sure = best if found is None else Crossing(*found, n), is_sure and sure
+    return best, is_sure
+
+
+def _first_zero(
+    one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, before: Crossing | None
+) -> tuple[tuple[int, float] | None, bool]:
+    """Step and share of it where one quantity first falls below zero, from share a (n,) of each of some steps on.
+
+    before: another crossing, after which nothing counts.
+    """
+    best, b = None if before is None else before[:2], np.ones(len(rows))
+    found: tuple[int, float] | None = None
+    while len(rows):
+        begins, ends = np.split(_values(one, p, block, np.tile(rows, 2), np.concatenate([a, b]))[0], 2)
+        clear, goes_one_way = told_by_slopes(one, p, block, Cells(rows, a, b), begins, ends)
+        told = clear | goes_one_way | (b - a <= SHORTEST)
+        passes = np.flatnonzero(told & ~clear & ((begins < 0.0) | (ends < 0.0)))
+        for k in passes[np.lexsort((a[passes], rows[passes]))].tolist():
+            row, at = int(rows[k]), float(a[k])
+            if best is not None and (row, at) >= best:
                 break
-            s = at if before[each] < 0.0 else _root(watched, p, block, row, at, float(cells.b[each]), n)
-            best = Crossing(row, s, n) if best is None or (row, s) < best[:2] else best
-        split = ~(clear | single | last)
+            place = row, at if begins[k] < 0.0 else _root(one, p, block, row, at, float(b[k]))
+            if best is None or place < best:
+                best = found = place
+        split = ~told
         if best is not None:
-            split &= (cells.rows < best.row) | ((cells.rows == best.row) & (cells.a < best.s))
-        cells = cells.take(split)
-        middle = 0.5 * (cells.a + cells.b)
-        halves = cells._replace(b=middle), cells._replace(a=middle)
-        cells = Cells._make([np.concatenate(pair) for pair in zip(*halves, strict=True)])
-        if len(cells.rows) > MOST_CELLS:
-            return best, False
-    return best, True
+            split &= (rows < best[0]) | ((rows == best[0]) & (a < best[1]))
+        rows, a, b = rows[split], a[split], b[split]
+        middle = 0.5 * (a + b)
+        rows, a, b = np.tile(rows, 2), np.concatenate([a, middle]), np.concatenate([middle, b])
+        if len(rows) > MOST_CELLS:
+            return found, False
+    return found, True
+
+
+class Cells(NamedTuple):
+    """Parts of steps, from share a to share b, (n,) each."""
+
+    rows: Indices
+    a: Array
+    b: Array
+
+
+def told_by_slopes(
+    one: Quantities, p: Array, block: StepBlock, cells: Cells, begins: Array, ends: Array
+) -> tuple[Array, Array]:
+    """Of one quantity, with values at both ends of cells, whether it is positive there, and whether it goes one way."""
+    down, up = outputs_of(one.slope_bounds, p, *_tangents(block, *cells))
+    with np.errstate(all="ignore"):
+        # it lies above the lines of the least slope from the left and the largest from the right, which meet here
+        least = (begins * up - ends * down + up * down * (cells.b - cells.a)) / (up - down)
+    one_way = np.isfinite(up - down) & ((down >= 0.0) | (up <= 0.0))
+    return (np.where(one_way, np.minimum(begins, ends), least) > 0.0) & np.isfinite(up - down), one_way
 
 
 def told_by_bounds(
-    watched: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
+    one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
 ) -> tuple[Array, Array, Array]:
-    """Of one quantity and cells, (n,), whether it is clear of zero, goes one way, and is bounded."""
-    cells = Cells(rows, a, b, np.zeros_like(rows))
-    low, high = outputs_of(watched.bounds, p, *_hulls(block, rows, a, b))
-    down, up = outputs_of(watched.slope_bounds, p, *_tangents(block, cells))
+    """Of one quantity and cells, (n,), whether it is clear of zero, goes one way, and is bounded, as not at a pole."""
+    low, high = outputs_of(one.bounds, p, *_hulls(block, rows, a, b))
+    down, up = outputs_of(one.slope_bounds, p, *_tangents(block, rows, a, b))
     clear = (low > 0.0) | (high < 0.0)
     is_bounded = np.isfinite(high - low)
     return clear, is_bounded & ((down >= 0.0) | (up <= 0.0)), is_bounded
 
 
-def _left_at(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> Array:
-    """The share of the first step from which each quantity is looked at, (k,); 1 where it stays on its side."""
-    begins = np.where(np.isnan(fresh), 0.0, 1.0)
-    if begins.any():
-        s = np.linspace(0.0, 1.0, PARTS + 1)
-        values = _values(watched, p, block, np.zeros(len(s), dtype=np.intp), s)
-        size = np.abs(values).max(axis=1)
-        for k in np.flatnonzero((begins > 0.0) & (size > fresh)):
-            left = np.flatnonzero(values[k] >= LEFT * size[k])
-            begins[k] = s[left[0]] if len(left) else 1.0 - UNIT if values[k, -1] < 0.0 else 1.0
-    return begins
+def _left_at(one: Quantities, p: Array, block: StepBlock, rounding: float) -> float:
+    """The share of the first step from which a quantity that begins at zero is looked at; 1 if it stays on its side."""
+    if math.isnan(rounding):
+        return 0.0
+    s = np.linspace(0.0, 1.0, PARTS + 1)
+    values = _values(one, p, block, np.zeros(len(s), dtype=np.intp), s)[0]
+    size = np.abs(values).max()
+    if not size > rounding:
+        return 1.0
+    left = np.flatnonzero(values >= LEFT * size)
+    return float(s[left[0]]) if len(left) else 1.0 - UNIT if values[-1] < 0.0 else 1.0
 
 
-def _values(watched: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:
-    return outputs_of(watched.values, block.polynomials_at(rows, s).T, block.times_at(rows, s)[None], p)
+def _values(one: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:
+    return outputs_of(one.values, block.polynomials_at(rows, s).T, block.times_at(rows, s)[None], p)
 
 
-def _root(watched: Quantities, p: Array, block: StepBlock, row: int, low: float, high: float, number: int) -> float:
+def _root(one: Quantities, p: Array, block: StepBlock, row: int, low: float, high: float) -> float:
     """The first share of a step, but for rounding, at which a quantity that falls is below zero (Chandrupatla 1997)."""
     assert block.dense is not None
     powers, start = block.dense[row][::-1], block.x_old[row]
@@ -212,14 +249,14 @@ def _root(watched: Quantities, p: Array, block: StepBlock, row: int, low: float,
         float(block.t_old[row]),
         float(block.h[row]),
         p.tolist(),
-        _function(watched.values, numbers=True),
+        _operations(one.values, numbers=True),
     )
 
     def value(s: float) -> float:
         x = np.zeros_like(start)
         for coefficients in powers:
             x = (x + coefficients) * s
-        return float(function([*(start + x).tolist(), t + s * h, *fixed])[number])
+        return float(function([*(start + x).tolist(), t + s * h, *fixed])[0])
 
     a, b, f_a, f_b = low, high, value(low), value(high)
     if not f_b < 0.0:
@@ -268,11 +305,11 @@ def _hulls(block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, 
     return np.vstack([low, ends.min(axis=0)]), np.vstack([high, ends.max(axis=0)])
 
 
-def _tangents(block: StepBlock, cells: Cells) -> tuple[Array, Array]:
+def _tangents(block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:
     """Least and largest states, times and their derivatives by the share of the step."""
     assert block.dense is not None
-    low, high = _hulls(block, cells.rows, cells.a, cells.b)
+    low, high = _hulls(block, rows, a, b)
     powers = np.arange(1, block.dense.shape[1] + 1)[:, None]
-    slopes = _bernstein(powers * block.dense[cells.rows], cells.a, cells.b)
-    h = block.h[cells.rows][None]
+    slopes = _bernstein(powers * block.dense[rows], a, b)
+    h = block.h[rows][None]
     return np.vstack([low, slopes[0], h]), np.vstack([high, slopes[1], h])
