@@ -20,6 +20,7 @@ from cgraph import Graph
 from cgraph._shared import Array, kept_by_first, memo
 from cgraph.extend import enclosure
 
+from ...integrators.problem import reaches
 from ..steps.dense_output import UNIT, Indices, StepBlock
 
 MOST_CELLS = 4096  # that wait at once
@@ -51,9 +52,16 @@ class Quantities:
         return cg.simplify(cg.jvp(self.values, list(self.values.input_names[: self.size + 1])))
 
     @cached_property
-    def bounds(self) -> Graph:
-        """Lower and upper bounds of the values: inputs the parameters, then lows and highs of states and t."""
-        return enclosure(self.values, exact=self._parameters)
+    def affine(self) -> tuple[bool, ...]:
+        """Whether each is a sum of states and t times what is constant, whose bounds are those of control points."""
+        moving = self.slopes.inputs[: self.size + 1]
+        return tuple([not reaches([slope], moving) for slope in self.slopes.outputs.values()])
+
+    @cached_property
+    def curved(self) -> Graph:
+        """Bounds of those that are not affine: inputs the parameters, then lows and highs of states and t."""
+        outputs = [each for each, affine in zip(self.values.outputs.items(), self.affine, strict=True) if not affine]
+        return enclosure(Graph(self.values.inputs, dict(outputs)), exact=self._parameters)
 
     @cached_property
     def slope_bounds(self) -> Graph:
@@ -140,8 +148,8 @@ def outputs_of(graph: Graph, *parts: Any) -> Array:
 def steps_near_zero(watched: Quantities, p: Array, block: StepBlock) -> list[int]:
     """Steps in which quantities may not be positive."""
     rows = np.arange(len(block.t))
-    bounds = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))
-    return list(np.flatnonzero(~(bounds[: len(bounds) // 2] >= 0.0).all(axis=0)).tolist())
+    low, _ = _bounds(watched, p, block, rows, np.zeros(len(rows)), np.ones(len(rows)))
+    return list(np.flatnonzero(~(low >= 0.0).all(axis=0)).tolist())
 
 
 def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> tuple[Crossing | None, bool]:
@@ -151,7 +159,7 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
     in the first step; NaN of the others.
     """
     rows, best, is_sure = np.arange(len(block.t)), None, True
-    low = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))[: len(fresh)]
+    low, _ = _bounds(watched, p, block, rows, np.zeros(len(rows)), np.ones(len(rows)))
     doubtful, number = np.nonzero(~(low >= 0.0).T)
     for n in dict.fromkeys(number.tolist()):
         where = doubtful[number == n]
@@ -205,7 +213,7 @@ def told_by_slopes(
     one: Quantities, p: Array, block: StepBlock, cells: Cells, begins: Array, ends: Array
 ) -> tuple[Array, Array]:
     """Of one quantity, with values at both ends of cells, whether it is positive there, and whether it goes one way."""
-    down, up = outputs_of(one.slope_bounds, p, *_tangents(block, *cells))
+    down, up = _slope_bounds(one, p, block, *cells)
     with np.errstate(all="ignore"):
         # it lies above the lines of the least slope from the left and the largest from the right, which meet here
         least = (begins * up - ends * down + up * down * (cells.b - cells.a)) / (up - down)
@@ -217,8 +225,8 @@ def told_by_bounds(
     one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
 ) -> tuple[Array, Array, Array]:
     """Of one quantity and cells, (n,), whether it is clear of zero, goes one way, and is bounded, as not at a pole."""
-    low, high = outputs_of(one.bounds, p, *_hulls(block, rows, a, b))
-    down, up = outputs_of(one.slope_bounds, p, *_tangents(block, rows, a, b))
+    low, high = [each[0] for each in _bounds(one, p, block, rows, a, b)]
+    down, up = _slope_bounds(one, p, block, rows, a, b)
     clear = (low > 0.0) | (high < 0.0)
     is_bounded = np.isfinite(high - low)
     return clear, is_bounded & ((down >= 0.0) | (up <= 0.0)), is_bounded
@@ -287,29 +295,59 @@ def _binomials(degree: int) -> tuple[Array, Array]:
     return choose, choose.T / choose[:, degree]
 
 
-def _bernstein(coefficients: Array, a: Array, b: Array) -> tuple[Array, Array]:
-    """Least and largest Bernstein coefficients (m, n) of polynomials (n, degree + 1, m) on [a, b] (n,)."""
+def _control_points(coefficients: Array, a: Array, b: Array) -> Array:
+    """Bernstein coefficients (n, degree + 1, m) of polynomials (n, degree + 1, m) on [a, b] (n,)."""
     degree = coefficients.shape[1] - 1
     choose, matrix = _binomials(degree)
     i, k = np.indices(choose.shape)
     parts = choose * a[:, None, None] ** np.maximum(k - i, 0) * (b - a)[:, None, None] ** i
-    points = matrix @ np.where(k >= i, parts, 0.0) @ coefficients
+    return np.asarray(matrix @ np.where(k >= i, parts, 0.0) @ coefficients)
+
+
+def _state_points(block: StepBlock, rows: Indices, a: Array, b: Array) -> Array:
+    """Control points of states and times on cells, (n, degree + 1, m + 1)."""
+    assert block.dense is not None
+    x = _control_points(np.concatenate([block.x_old[rows, None], block.dense[rows]], axis=1), a, b)
+    t = np.linspace(block.times_at(rows, a), block.times_at(rows, b), x.shape[1], axis=1)
+    return np.concatenate([x, t[:, :, None]], axis=2)
+
+
+def _slope_points(block: StepBlock, rows: Indices, a: Array, b: Array) -> Array:
+    """The same of their derivatives by the share of the step, (n, degree, m + 1)."""
+    assert block.dense is not None
+    powers = np.arange(1, block.dense.shape[1] + 1)[:, None]
+    slopes = _control_points(powers * block.dense[rows], a, b)
+    h = np.broadcast_to(block.h[rows, None, None], (*slopes.shape[:2], 1))
+    return np.concatenate([slopes, h], axis=2)
+
+
+def _ends(points: Array) -> tuple[Array, Array]:
+    """Least and largest of control points, (m, n)."""
     return points.min(axis=1).T, points.max(axis=1).T
 
 
-def _hulls(block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:
-    """Least and largest states and times on cells, (m + 1, n)."""
-    assert block.dense is not None
-    low, high = _bernstein(np.concatenate([block.x_old[rows, None], block.dense[rows]], axis=1), a, b)
-    ends = np.stack([block.times_at(rows, a), block.times_at(rows, b)])
-    return np.vstack([low, ends.min(axis=0)]), np.vstack([high, ends.max(axis=0)])
+def _bounds(watched: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:
+    """Lower and upper bounds of quantities on cells, (k, n)."""
+    points, affine = _state_points(block, rows, a, b), np.array(watched.affine)
+    low, high = np.empty((2, len(affine), len(rows)))
+    if affine.any():
+        at = outputs_of(watched.values, points.reshape(-1, points.shape[2]).T, p)[affine]
+        parts = at.reshape(len(at), *points.shape[:2])
+        low[affine], high[affine] = parts.min(axis=2), parts.max(axis=2)
+    if not affine.all():
+        low[~affine], high[~affine] = np.split(outputs_of(watched.curved, p, *_ends(points)), 2)
+    return low, high
 
 
-def _tangents(block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:
-    """Least and largest states, times and their derivatives by the share of the step."""
-    assert block.dense is not None
-    low, high = _hulls(block, rows, a, b)
-    powers = np.arange(1, block.dense.shape[1] + 1)[:, None]
-    slopes = _bernstein(powers * block.dense[rows], a, b)
-    h = block.h[rows][None]
-    return np.vstack([low, slopes[0], h]), np.vstack([high, slopes[1], h])
+def _slope_bounds(
+    one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
+) -> tuple[Array, Array]:
+    """Lower and upper bounds of the slope of one quantity by the share of the step on cells, (n,)."""
+    points, slopes = _state_points(block, rows, a, b), _slope_points(block, rows, a, b)
+    if one.affine[0]:
+        at = np.repeat(points[:, :1], slopes.shape[1], axis=1).reshape(-1, points.shape[2]).T
+        found = outputs_of(one.slopes, at, p, slopes.reshape(-1, slopes.shape[2]).T)[0].reshape(slopes.shape[:2])
+        return found.min(axis=1), found.max(axis=1)
+    (low, high), (down, up) = _ends(points), _ends(slopes)
+    least, largest = outputs_of(one.slope_bounds, p, np.vstack([low, down]), np.vstack([high, up]))
+    return least, largest
