@@ -110,10 +110,7 @@ class Motion:
             if abs(value) > 1.0 + SMALL or (abs(value) > 1.0 - SMALL and value * (share @ rate) >= 0.0):
                 return False
         for j in near:
-            slopes, scale = (
-                [self.surfaces[j] @ rate, self.surfaces[j] @ matrix @ rate],
-                SMALL * (1.0 + max(np.abs(rate))),
-            )
+            slopes, scale = self.surfaces[j] @ np.array([rate, matrix @ rate]).T, SMALL * (1.0 + max(np.abs(rate)))
             if self.signs[j] and next((self.signs[j] * each for each in slopes if abs(each) > scale), -1.0) < 0.0:
                 return False
         return True

@@ -189,10 +189,10 @@ def passing(u: Draw, value: str, zeros: str) -> Case:
     if swings:  # x = cos(t)
         half = np.arccos(levels[np.abs(levels) < 1.0])
         times = np.hstack([2.0 * math.pi * turn + way * half for way in (1, -1) for turn in range(3)])
-        times = np.hstack([times, [0.0] * (np.abs(np.abs(levels) - 1.0) < 1e-2).any()])  # it grazes
     else:
         times = (levels - start) / speed
-    if (np.minimum(np.abs(times), np.abs(times - end)) < 1e-3 * end).any():
+    grazes = swings and (np.abs(np.abs(levels) - 1.0) < 1e-2).any()
+    if grazes or (np.minimum(np.abs(times), np.abs(times - end)) < 1e-3 * end).any():
         raise PoorDrawError
     quantity, lengths = formulas(value), {name: each * u.unit("x") for name, each in numbers.items()}
     model = dyn.System(lambda q, qd, t: (u.unit("m") * qd[0] ** 2 - swings * u.unit("k") * q[0] ** 2) / 2, ["x0"])
