@@ -169,7 +169,7 @@ def floating():
 )
 def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
     case, one, ours = floating
-    if name in ("heyoka", "sympy", "torch") or (name, task) == ("pinocchio", "rk4"):
+    if name == "heyoka" or (name, task) == ("pinocchio", "rk4"):
         with pytest.raises(UnavailableError, match="rates of"):
             prepared(name, case, task, mode)
         return
@@ -181,7 +181,7 @@ def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
     assert difference(found, expected, x if task == "rk4" else 0.0) < ROUNDING
 
 
-@pytest.mark.parametrize("name", [name for name in PEERS if name != "torch"])
+@pytest.mark.parametrize("name", PEERS)
 def test_a_peer_takes_parameters_and_applied_forces(name):
     system = dyn.System(
         lambda q, qd, t, p: 0.5 * p["I"] * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2,
