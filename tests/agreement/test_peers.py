@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.verification.residual import UnavailableError
 from tests.agreement.agreement import QUANTITIES, differences, random_arm
 from tests.bench.peers import PEERS, PeerModel
 from tests.bench.peers.peer import BATCH, DERIVATIVES, DT, MODES, MOTIONS, NUDGE, PASSES, TASKS
 from tests.bench.speed.scenes import free_tree, load
 from tests.each_row import each_row
+from tests.mujoco_twin import AskedTwin
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
 # Of quotients of differences, with steps of 5e-4: their rounding is 1e-12, what they leave out 1e-10.
@@ -27,7 +27,7 @@ class Reference:
 
     def __init__(self, case: PeerModel) -> None:
         pytest.importorskip("mujoco")
-        self.n, self.twin = case.n, MujocoTwin(case.model)
+        self.n, self.twin = case.n, AskedTwin(case.model)
         names = case.model.coordinates
         self.order = np.array([self.twin.model.joint(name).id for name in names])
 
