@@ -1,0 +1,135 @@
+"""Rates that jump or kink: steps end at the surfaces, motions slide on them, and slopes go across."""
+
+import math
+from typing import Any
+
+import numpy as np
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.integrators import METHODS, derive
+from dynamics.integrators.switches import switched
+from tests.slow import slow
+
+EVERY = ["dop853", "rk4", "radau", *slow("dopri5", "rodas", "taylor", "gauss4", "midpoint", "verlet", "kahan_li6")]
+SECOND_ORDER = {"midpoint", "verlet"}
+
+
+def options(method: str) -> dict[str, Any]:
+    return {} if METHODS[method].adaptive else {"dt": 0.005}
+
+
+def sliding(**friction: float) -> dyn.System:
+    """A block of 1 kg under a load that grows with time, with dry friction."""
+    return dyn.System(
+        lambda q, qd, t, p: 0.5 * qd[0] ** 2 + p["load"] * t * q[0],
+        ["x"],
+        {"mu": 2.0, "load": 1.0} | friction,
+        forces=lambda q, qd, t, p: [-p["mu"] * cg.sign(qd[0])],
+    )
+
+
+@mark.parametrize("method", EVERY)
+def test_a_block_comes_to_rest_sticks_and_breaks_away(method: str) -> None:
+    """v' = t - 2 sign v from v = 1: at rest at 2 - sqrt(2), stuck until t = 2, then v = (t - 2)^2 / 2."""
+    rest, end = 2.0 - math.sqrt(2.0), 4.0
+    way = rest - rest**2 + rest**3 / 6.0
+    run = dyn.simulate(sliding(), [0.0], [1.0], end, method, t_eval=[1.0, end], **options(method))
+    rel = 1e-4 if method in SECOND_ORDER else 1e-7
+    assert run.q[:, 0] == approx([way, way + (end - 2.0) ** 3 / 6.0], rel=rel)
+    assert run.qd[0, 0] == 0.0
+    assert run.qd[1, 0] == approx(0.5 * (end - 2.0) ** 2, rel=rel)
+
+
+@mark.parametrize("method", EVERY)
+def test_slopes_go_through_rest_and_breaking_away(method: str) -> None:
+    """x(4) = way(v, mu) + int from mu on of (t - mu)^2 / 2, with rest at mu - sqrt(mu^2 - 2 v): both closed."""
+
+    def end(v: float, mu: float) -> float:
+        rest = mu - math.sqrt(mu**2 - 2.0 * v)
+        return v * rest - 0.5 * mu * rest**2 + rest**3 / 6.0 + (4.0 - mu) ** 3 / 6.0
+
+    h = 1e-5
+    right = [(end(1.0 + h, 2.0) - end(1.0 - h, 2.0)) / (2.0 * h), (end(1.0, 2.0 + h) - end(1.0, 2.0 - h)) / (2.0 * h)]
+    how = options(method) | {"method": method, "wrt": ["qd", "mu"]}
+    found = dyn.gradient(sliding(), lambda q, qd, t: q[0], [0.0], [1.0], 4.0, **how)
+    forward = dyn.sensitivities(sliding(), [0.0], [1.0], 4.0, **how)
+    assert [*found["qd"], found["mu"]] == approx(right, rel=1e-4)
+    assert [*forward["qd"][-1, 0], forward["mu"][-1, 0]] == approx(right, rel=1e-4)
+
+
+@mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@mark.parametrize("count", [3, *slow(8)])
+def test_coupled_joints_come_to_rest_in_any_units(unit: float, count: int) -> None:
+    """Dry friction takes all energy: a chain of springs rests where no load is above its friction, and stays."""
+    rng = np.random.default_rng(count)
+    loss = rng.uniform(0.2, 0.4, count)
+
+    def lagrangian(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> cg.Node:
+        kinetic = sum(0.5 * v**2 for v in qd) + sum(0.3 * a * b for a, b in zip(qd, qd[1:], strict=False))
+        return kinetic - sum(0.5 * x**2 for x in q) - sum(0.2 * (a - b) ** 2 for a, b in zip(q, q[1:], strict=False))
+
+    def friction(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> list[cg.Node]:
+        return [-unit * each * cg.sign(v) for each, v in zip(loss, qd, strict=True)]
+
+    chain = dyn.System(lagrangian, [f"x{k}" for k in range(count)], forces=friction)
+    run = dyn.simulate(chain, unit * rng.uniform(-3.0, 3.0, count), np.zeros(count), 40.0)
+    assert run.success
+    assert (run.qd[-1] == 0.0).all()
+    held = dyn.simulate(chain, run.q[-1], np.zeros(count), 40.0)
+    assert held.q[-1].tolist() == run.q[-1].tolist()
+
+
+def test_a_smooth_model_is_the_same_object() -> None:
+    smooth = derive(dyn.planar_arm([1.0, 1.0], [1.0, 1.0]), {})
+    assert switched(smooth) is smooth
+    guarded = dyn.OdeSystem(lambda x, t: [cg.where(cg.equal(x[0], 0.0), 1.0, cg.sin(x[0]) / x[0])], ["x"])
+    assert switched(derive(guarded, {})) is derive(guarded, {})
+
+
+def test_surfaces_that_are_one_share_a_mode() -> None:
+    """a < b, max(b, a), |2 a - 2 b| and sign(b - a)."""
+    model = dyn.OdeSystem(
+        lambda x, t: [
+            cg.less(x[0], x[1]) + cg.maximum(x[1], x[0]) + cg.sign(x[1] - x[0]) + cg.abs(2.0 * (x[0] - x[1])),
+            x[0] * cg.abs(1.0 + x[0] ** 2),
+        ],
+        ["a", "b"],
+    )
+    problem = switched(derive(model, {}))
+    assert problem.switches is not None
+    assert len(problem.switches.modes) == 1
+
+
+def test_steps_from_one_time_to_the_next_cross_surfaces() -> None:
+    for method in ("dop853", "rk4"):
+        going = dyn.prepare(sliding(), method, **options(method)).start([0.0], [1.0], 4.0)
+        while going.t < 1.0:
+            going.step()
+        going.propagate_until(4.0)
+        assert going.q == approx(dyn.simulate(sliding(), [0.0], [1.0], 4.0).q[-1], rel=1e-7)
+
+
+def test_a_pulse_far_shorter_than_a_step_is_met() -> None:
+    pulse = dyn.System(
+        lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 0.5 * q[0] ** 2,
+        ["x"],
+        {"width": 1e-6},
+        forces=lambda q, qd, t, p: [cg.where(cg.abs(t - 50.0) < 0.5 * p["width"], 1.0 / p["width"], 0.0)],
+    )
+    assert dyn.simulate(pulse, [0.5], [0.0], 60.0).q[-1, 0] == approx(0.5 * math.cos(60.0) + math.sin(10.0), rel=1e-6)
+
+
+def test_independent_stops_at_an_instant_have_slopes_and_others_are_said() -> None:
+    def stops(coupling: float) -> dyn.System:
+        return dyn.System(
+            lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) + coupling * qd[0] * qd[1],
+            ["x", "y"],
+            forces=lambda q, qd, t: [-cg.sign(v) for v in qd],
+        )
+
+    found = dyn.sensitivities(stops(0.0), [0.0, 0.0], [1.0, 1.0], 2.0, wrt="qd")
+    assert found["qd"][-1, :2] == approx(np.eye(2), abs=1e-9)  # x = v^2 / 2
+    with raises(ValueError, match=r"cross zero at one instant, t = 1\.\d* s, and one hastens the other"):
+        dyn.sensitivities(stops(0.5), [0.0, 0.0], [1.5, 1.5], 3.0, wrt="qd")
