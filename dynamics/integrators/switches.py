@@ -44,18 +44,26 @@ class Switches:
     called: Mapping[str, str]  # {name of an input: what a person calls it}
 
     @cached_property
+    def sides(self) -> list[Node]:
+        """The side of each surface at a state, over the inputs alone."""
+        known: dict[Node, Node] = {}
+        for mode, g, spacing in zip(cg.variables(list(self.modes)), self.surfaces, self.spacing, strict=True):
+            (plain,) = folded([g], Builder(), known)
+            known[mode] = cg.sign(plain) if spacing == 2.0 else cg.floor(plain)
+        return list(known.values())
+
+    @cached_property
     def words(self) -> tuple[str, ...]:
         """The surfaces as formulas, such as "qd.x", or "floor(t)"; dots stand for what is long."""
-        names = Names(Graph(self.gaps.inputs, {f"{k}": g for k, g in enumerate(self.surfaces)}), self.called)
-        words, known = list[str](), dict[str, str]()
-        for g, mode, spacing in zip(self.surfaces, self.modes, self.spacing, strict=True):
+        names = Names(Graph(self.gaps.inputs, {f"{k}": side for k, side in enumerate(self.sides)}), self.called)
+        texts = list[str]()
+        for side in self.sides:
+            g = side if side.op.name == "floor" else side.args[0]
             first = g.args[0].value if g.op.name == "add" else None
             text = names.text(g if first is None else g.args[1], LONGEST_WORDS)
             text += "" if first is None else f" {'-' if first < 0.0 else '+'} {abs(first):.6g}"
-            text = re.sub(r"%\d+", "..", re.sub(r"(?<![\w.])\w+", lambda found: known.get(found[0], found[0]), text))
-            words.append(text if spacing == 2.0 else f"floor({text})")
-            known[mode] = f"sign({text})" if spacing == 2.0 else words[-1]
-        return tuple(words)
+            texts.append(re.sub(r"%\d+", "..", text))
+        return tuple(texts)
 
 
 @kept_by_first
