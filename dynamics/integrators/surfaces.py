@@ -19,15 +19,12 @@ SMALL = 1e-7  # of the rate, or its slope, there and at the state, below which a
 
 
 class Surface(NamedTuple):
-    """A surface: its formula, as `Switches.words`, its tags, and what is there, "jump", "kink" or "smooth".
-
-    by: {output: what the rate jumps by, or its slope by the formula}, where it changes; smooth are both.
-    """
+    """A surface, as `Switches.words`, its tags, and by how much the rate jumps there, or its slope by the formula."""
 
     formula: str
     tags: tuple[str, ...]
-    kind: str
-    by: Mapping[str, float]
+    kind: str  # "jump", "kink", or "smooth" where neither changes
+    by: Mapping[str, float]  # {output of the rate: change}
 
 
 def surfaces(model: Model, at: Mapping[str, float], form: str = "velocity") -> list[Surface]:
@@ -35,37 +32,37 @@ def surfaces(model: Model, at: Mapping[str, float], form: str = "velocity") -> l
     problem = switched(in_form(derive(model, {}), form))
     if (switches := problem.switches) is None:
         return []
-    n, m, names = len(switches.modes), problem.size + 1, problem.rate.input_names
-    start, floors = np.array([at.get(name, 0.0) for name in names[: len(names) - n]]), np.array(switches.spacing) == 1.0
-    modes = np.where(floors, 0.0, 1.0)
+    rate, n, m = problem.rate, len(switches.modes), problem.size
+    start, floors = np.array([at.get(name, 0.0) for name in rate.input_names[:-n]]), np.array(switches.spacing) == 1.0
+    slopes = [cg.jacobian(graph, list(rate.inputs[: m + 1])) for graph in (switches.gaps, rate)]
 
     def values(graph: cg.Graph, *point: Array) -> Array:
-        return np.array(list(graph.evaluate(dict(zip(names, np.concatenate(point), strict=True))).values()))
+        return np.array(list(graph.evaluate(dict(zip(rate.input_names, np.concatenate(point), strict=True))).values()))
 
-    slopes, rate_slopes = (cg.jacobian(graph, list(problem.rate.inputs[:m])) for graph in (switches.gaps, problem.rate))
-    found = list[Surface]()
+    found, modes = list[Surface](), np.where(floors, 0.0, 1.0)
     with np.errstate(all="ignore"):
-        for _ in modes:
+        for _ in range(n):
             gaps = values(switches.gaps, start, modes)
             modes = np.where(floors, modes + np.floor(gaps), np.where(gaps < 0.0, -1.0, 1.0))
         for k, (formula, g) in enumerate(zip(switches.words, switches.surfaces, strict=True)):
-            point = start.copy()
+            point, upper = start.copy(), modes[k] if floors[k] else 1.0
             for _ in range(NEAREST):
-                normal = values(slopes, point, modes).reshape(n, m)[k]
+                normal = values(slopes[0], point, modes).reshape(n, m + 1)[k]
                 normal /= normal @ normal
-                if np.isfinite(normal).all():
-                    point[:m] -= values(switches.gaps, point, modes)[k] * normal
-            sides = [np.where(np.arange(n) == k, side, modes) for side in (modes[k] - 1.0 if floors[k] else -1.0, 1.0)]
-            sides[1][k] = modes[k] if floors[k] else 1.0
-            kind, by = "smooth", dict[str, float]()
-            for what, graph in (("jump", problem.rate), ("kink", rate_slopes)):
-                below, above = (np.array([values(graph, each, side) for each in (point, start)]) for side in sides)
-                if what == "kink":
-                    below, above = (each.reshape(2, m - 1, m) @ normal for each in (below, above))
-                size = np.abs([*below, *above]).max(axis=0)
-                if len(changed := np.flatnonzero(np.abs(above[0] - below[0]) > SMALL * size)):
-                    outputs = list(problem.rate.outputs)
-                    kind, by = what, {outputs[i]: float(above[0, i] - below[0, i]) for i in changed}
+                point[: m + 1] -= np.nan_to_num(values(switches.gaps, point, modes)[k] * normal)
+            sides = [np.where(np.arange(n) == k, side, modes) for side in (upper - switches.spacing[k], upper)]
+            points = [(each, side) for each in (point, start) for side in sides]  # below and above, there and here
+            jump = [values(rate, *each) for each in points]
+            kink = [values(slopes[1], *each).reshape(m, m + 1) @ normal for each in points]
+            for kind, parts in (("jump", jump), ("kink", kink), ("smooth", [np.zeros(m)] * 4)):
+                changes = dict(zip(rate.outputs, (parts[1] - parts[0]).tolist(), strict=True))
+                size = SMALL * np.abs(parts).max(axis=0)
+                by = {
+                    name: change
+                    for (name, change), most in zip(changes.items(), size, strict=True)
+                    if abs(change) > most
+                }
+                if by or kind == "smooth":
+                    found.append(Surface(formula, tuple(sorted(g.tags)), kind, by))
                     break
-            found.append(Surface(formula, tuple(sorted(g.tags)), kind, by))
     return found
