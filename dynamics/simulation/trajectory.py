@@ -63,9 +63,8 @@ class Stats:
         Of equal steps, the estimated error of the state, phase included, the largest over the run, and that at the end,
         of the component where it is largest over its largest value. It is the difference from a run of steps twice as
         long over 2^k - 1, where one of steps four times as long tells the order k; where it is large, the difference
-        itself. Infinite where it is unknown, as where the rate has a jump or a kink on the way, which a warning
-        explains. None of chosen steps, without `estimate_error`, with a SampledController or events that reset the
-        state, and of runs that fail or end in the first steps.
+        itself. Infinite where it is unknown, which a warning explains. None of chosen steps, without `estimate_error`,
+        with a SampledController or events that reset the state, and of runs that fail or end in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 
