@@ -4,8 +4,7 @@ VENV ?= .venv
 OUT ?= paper
 WORKERS ?= 2
 WORST ?= 15
-FIGURES ?= speed motions counts operations build compile long-chains agreement ensembles closed-chains reconfiguration trust \
-	tightest hybrid
+FIGURES ?= speed motions counts operations compile long-chains agreement ensembles reconfiguration trust tightest hybrid
 
 BIN = $(VENV)/bin
 LOCKED = .venv-locked/bin

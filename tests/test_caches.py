@@ -18,7 +18,7 @@ from tests.sources import ROOT, sources
 
 HOME = "cgraph.util.caches"
 MOST = 25
-WEAK = {"cgraph.core.label", "dynamics.multibody.trees.structure"}  # have weak tables, which docs/design.md explains
+WEAK = {"cgraph.core.label"}  # has weak tables, which docs/design.md explains
 # Tables that a module or a call of `register` fills, by the name that their rows are asked for by.
 TABLES = {
     "cgraph.core.row.ROWS",

@@ -69,6 +69,16 @@ class Problem:
         system = self.system
         return system is not None and system.kinematics.quasi is None and not len(system.constraints)
 
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Names of the parameters that a run is given: all but modes."""
+        return self.parameters if self.switches is None else self.parameters[: -len(self.switches.modes)]
+
+    @property
+    def portable(self) -> Problem:
+        """The problem without its model, which pickles: enough to step a problem in modes."""
+        return replace(self, model=None, system=None)
+
     @cached_property
     def timed(self) -> bool:
         """Whether f depends on t."""

@@ -44,7 +44,7 @@ def surfaces(model: Model, at: Mapping[str, float], form: str = "velocity") -> l
         for _ in range(n):
             gaps = values(switches.gaps, start, modes)
             modes = np.where(floors, modes + np.floor(gaps), np.where(gaps < 0.0, -1.0, 1.0))
-        for k, (formula, g) in enumerate(zip(switches.words, switches.surfaces, strict=True)):
+        for k, (formula, g) in enumerate(zip(switches.words, switches.surfaces.outputs.values(), strict=True)):
             point, upper = start.copy(), modes[k] if floors[k] else 1.0
             for _ in range(NEAREST):
                 normal = values(slopes[0], point, modes).reshape(n, m + 1)[k]

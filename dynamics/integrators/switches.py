@@ -35,7 +35,7 @@ class Switches:
     """The surfaces of a problem in modes, which are its last parameters. Graphs are over states, t and parameters."""
 
     modes: tuple[str, ...]
-    surfaces: tuple[Node, ...]  # g, over the inputs of the rate and earlier modes
+    surfaces: Graph  # g, over the inputs of the rate and earlier modes
     spacing: tuple[float, ...]  # from one side to the next: 2, or 1 of a whole number
     signs: tuple[bool, ...]  # whether the rate has the sign of g as such, as friction has
     gaps: Graph  # g, less the n of a floor: zero at the lower end of a side, in a slide at the surface
@@ -47,7 +47,9 @@ class Switches:
     def sides(self) -> list[Node]:
         """The side of each surface at a state, over the inputs alone."""
         known: dict[Node, Node] = {}
-        for mode, g, spacing in zip(cg.variables(list(self.modes)), self.surfaces, self.spacing, strict=True):
+        for mode, g, spacing in zip(
+            cg.variables(list(self.modes)), self.surfaces.outputs.values(), self.spacing, strict=True
+        ):
             (plain,) = folded([g], Builder(), known)
             known[mode] = cg.sign(plain) if spacing == 2.0 else cg.floor(plain)
         return list(known.values())
@@ -90,7 +92,7 @@ def switched(problem: Problem) -> Problem:
     names = tuple([str(surface.mode.name) for surface in used])
     switches = Switches(
         names,
-        tuple([surface.quantity for surface in used]),
+        _numbered(inputs, [surface.quantity for surface in used]),
         tuple([surface.spacing for surface in used]),
         tuple([surface.is_sign for surface in used]),
         _numbered(inputs, over),
@@ -133,7 +135,7 @@ class _Reader:
         self._surfaces: dict[tuple[Node, float], _Surface] = {}
         self._places, self._known = _Places(), dict[tuple[int, float], Node]()
         if known is not None:
-            of = zip(known.surfaces, known.spacing, cg.variables(list(known.modes)), strict=True)
+            of = zip(known.surfaces.outputs.values(), known.spacing, cg.variables(list(known.modes)), strict=True)
             self._known = {(self._places.of(g), spacing): mode for g, spacing, mode in of}
 
     def read(self, nodes: Sequence[Node]) -> list[Node]:
@@ -316,7 +318,8 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         shares, moves = _solved(matrix, rights)
         rate = [_mixed(each, shares, [jump[i] for jump in jumps]) for i, each in enumerate(f)]
         onto = [_mixed(each, moves, [jump[i] for jump in jumps]) for i, each in enumerate(states)]
-        for hold, surface in zip(holds, [switches.surfaces[k] for k in chosen], strict=True):
+        surfaces = list(switches.surfaces.outputs.values())
+        for hold, surface in zip(holds, [surfaces[k] for k in chosen], strict=True):
             if surface in states:  # a state that stays zero does so exactly
                 i = states.index(surface)
                 rate[i], onto[i] = cg.where(hold, 0.0, rate[i]), cg.where(hold, 0.0, onto[i])

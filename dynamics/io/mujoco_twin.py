@@ -28,10 +28,10 @@ def joint_order(mj: MjModel, mechanism: Mechanism) -> tuple[list[int], list[int]
 
 
 class MujocoTwin:
-    """MuJoCo's model of a mechanism, asked for the quantities that the graphs give.
+    """MuJoCo's model of a mechanism, and its motions.
 
-    Damping is not in `bias`. Of a mechanism with loops it has the tree; accelerations and motions are refused, as
-    MuJoCo's equality constraints are soft. Raises ImportError without MuJoCo.
+    Of a mechanism with loops it has the tree; motions are refused, as MuJoCo's equality constraints are soft. Raises
+    ImportError without MuJoCo.
     """
 
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
@@ -48,46 +48,11 @@ class MujocoTwin:
         if self.mechanism.loops:
             raise MechanismError(f"MuJoCo has soft loops, and so no {what} of loop {self.mechanism.loops[0].label!r}")
 
-    def _set(self, q: Array, qd: Array) -> None:
-        self.data.qpos[:], self.data.qvel[:] = q, qd
-        self.data.qfrc_applied[:] = 0.0
-
-    def accelerations(self, q: Array, qd: Array, tau: Array) -> Array:
-        """qdd, (n,), by `mj_forward` under applied torque tau, (n,). Raises MechanismError for loops."""
-        self.require_tree("accelerations")
-        self._set(q, qd)
-        self.data.qfrc_applied[:] = tau
-        self.mujoco.mj_forward(self.model, self.data)
-        return np.array(self.data.qacc)
-
-    def inverse(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """tau, (n,), by `mj_inverse`; damping included."""
-        self._set(q, qd)
-        self.data.qacc[:] = qdd
-        self.mujoco.mj_inverse(self.model, self.data)
-        return np.array(self.data.qfrc_inverse)
-
-    def mass_matrix(self, q: Array) -> Array:
-        """M(q), (n, n)."""
-        self._set(q, np.zeros(self.model.nv))
-        self.mujoco.mj_forward(self.model, self.data)
-        columns = np.empty((self.model.nv, self.model.nv))
-        for column, unit in zip(columns, np.eye(self.model.nv), strict=True):  # mj_fullM differs between versions
-            self.mujoco.mj_mulM(self.model, self.data, column, unit)
-        return columns
-
-    def bias(self, q: Array, qd: Array) -> Array:
-        """Coriolis, centrifugal and gravity force and that of springs, (n,)."""
-        self._set(q, qd)
-        self.mujoco.mj_forward(self.model, self.data)
-        springs = self.data.qfrc_passive + self.model.dof_damping * qd
-        return np.array(self.data.qfrc_bias - springs)
-
     def trajectory(self, q: Array, qd: Array, steps: int) -> tuple[Array, Array]:
         """q and qd, (steps + 1, n) each, from the start on, by MuJoCo's RK4. Raises MechanismError for loops."""
         self.require_tree("motions")
         self.mujoco.mj_resetData(self.model, self.data)
-        self._set(q, qd)
+        self.data.qpos[:], self.data.qvel[:] = q, qd
         nq = self.model.nq
         states = np.empty((steps + 1, nq + self.model.nv))
         for k in range(steps + 1):

@@ -163,7 +163,7 @@ class MotionSteps:
         if not self._direction:
             self._run.begin(self._x, self.t, t if self._t_end is None else self._t_end)
             self._direction = math.copysign(1.0, t - self.t)
-        self._run.advance(t, single=single)
+        self._run.go(t, single=single)
         for text in self._run.warnings:
             warnings.warn(text, SimulationWarning, stacklevel=3)
         self._run.warnings.clear()

@@ -43,7 +43,6 @@ from .stepper import Stepper, stepper_of
 from .steps.dense_output import Solution, StepBlock
 from .steps.equal_steps import step_count
 from .steps.row_values import converted
-from .steps.step_program import step_program
 from .trajectory import Sides, SimulationWarning, Trajectory
 
 if TYPE_CHECKING:
@@ -235,13 +234,13 @@ class Run(HoldsNodes):
         run._require_controller_values(parameters)
         span = Span(t_end, t0=t0, t_eval=[t_end])
         start = initial_values(applied.model, q, qd, applied.constant, parameters, span.t0)
-        p = np.empty((len(start.x), len(problem.parameters)))
-        for k, name in enumerate(problem.parameters):
+        p = np.empty((len(start.x), len(problem.given)))
+        for k, name in enumerate(problem.given):
             p[:, k] = start.varied[name] if name in start.varied else start.bound[name]
 
         def task() -> Task:
             self._options.check(span, run._equations.problem.states)
-            return Task(step_program(problem, self._options.integrator, dense=False), self._options, span, len(p))
+            return Task(problem, self._options, span, len(p), dense=False)
 
         x = ends_of(
             run._made((len(p), span.t0, span.t_end), task), converted(problem.momentum, span.t0, start.x, p), p, workers
@@ -336,8 +335,7 @@ class Run(HoldsNodes):
     def _is_of_steps_alone(self) -> bool:
         """Whether nothing is done between the steps."""
         applied, _, _, stepped, watched = self._equations
-        more = stepped.switches or self._options.max_steps < math.inf
-        return not (watched or applied.controller or stepped.momenta or more)
+        return not (watched or applied.controller or stepped.momenta or self._options.max_steps < math.inf)
 
     @cached_property
     def _memories(self) -> threading.local:
@@ -352,6 +350,7 @@ class Run(HoldsNodes):
             options, problem = self._options, self._equations.problem
             rounded = options.adaptive and options.relative < options.integrator.finest
             more = options.estimated or rounded or problem.projection is not None or not self._is_of_steps_alone
+            more = more or self._equations.stepped.switches is not None
             zeros = [0.0] * len(problem.parameters)
             found = None if more else stepper_of(self._equations.stepped, options, zeros, dense=False)
             self._memories.made = found

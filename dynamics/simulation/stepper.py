@@ -28,7 +28,7 @@ from .steps.equal_steps import EqualSteps, equal_steps, steps_after
 from .steps.first_step import START, TOLERANCE, start_registers
 from .steps.flat_position import CREEP, FlatPosition
 from .steps.row_values import values_of
-from .steps.step_program import CompiledSteps, StepProgram, compile_steps, step_program
+from .steps.step_program import CompiledSteps, StepProgram, compile_steps, slide_program, step_program
 
 BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ctrl-C, progress and events
 TINY = np.finfo(float).tiny
@@ -62,6 +62,7 @@ class Stepper(ABC):
 
     def __post_init__(self) -> None:
         self._passes, self._given, self._first = FIRST_PASSES, list(self.parameters), 0.0
+        self._plain, self._pending = self.compiled, list[tuple[Crossing, StepBlock]]()
         self._load(self.compiled)
         if self.control is None:
             self.set_parameters(self._given)
@@ -118,14 +119,18 @@ class Stepper(ABC):
     def _enter_modes(self) -> None:
         """Take the steps of the problem that the modes are of, and their values."""
         assert self.modes is not None
-        program = step_program(self.modes.problem, self.options.integrator, dense=True)
-        if program is not self.program:
-            self._load(compile_steps(program, self.options.backend, self.options.fma))
+        compiled, problem, options = self._plain, self.modes.problem, self.options
+        if problem is not self.modes.plain:
+            program = slide_program(compiled.program, problem, options.integrator)
+            compiled = compile_steps(program, options.backend, options.fma)
+        if compiled is not self.compiled:
+            self._load(compiled)
         self.set_parameters(self._given)
 
-    def _turn(self, crossing: Crossing, block: StepBlock, t_end: float) -> None:
+    def _turn(self, t_end: float) -> None:
         """Go on where a surface is crossed, at the end of a block, with a step as long as the one that ends there."""
         assert self.modes is not None
+        ((crossing, block),), self._pending = self._pending, []
         t, x, sizes = float(block.t[-1]), block.x[-1].copy(), self.modes.sizes
         self._before = {name: getattr(self, name) for name in COUNTED}
         self.modes.turn(t, x, self._given, crossing.number)
@@ -171,12 +176,14 @@ class Stepper(ABC):
                     parts = [log(self.with_dense(parts[0]))]
                     crossing = None if log.ended or log.restart else crossing
                 self.steps -= len(block.t) - sum([len(part.t) for part in parts])
+                is_over = crossing is None or parts[-1].t[-1] == span.t_end
+                self._pending = [] if is_over else [(crossing, parts[-1])]
                 yield from [part for part in parts if len(part.t)]
                 if crossing is not None or (log is not None and (log.ended or log.restart)):
                     self.status = ""  # of a step beyond
                     break
-            if crossing is not None and parts[-1].t[-1] != span.t_end:
-                self._turn(crossing, parts[-1], span.t_end)
+            if self._pending:
+                self._turn(span.t_end)
                 continue
             if log is None:
                 return
@@ -220,6 +227,19 @@ class Stepper(ABC):
         self.modes.see(block.x)
         return [block], None
 
+    def go(self, t: float, *, single: bool = False) -> None:
+        """Go on to t, or by a single step, across surfaces."""
+        if self.modes is None:
+            self.advance(t, single=single)
+            return
+        self._aim(t)
+        span, self._passes = Span(t, t0=self.t), 1 if single else self._passes
+        for _ in self._going(span):
+            if single:
+                break
+        if self._pending:
+            self._turn(t)
+
     def with_dense(self, block: StepBlock) -> StepBlock:
         """The block that has come last, with dense output; that of equal steps is made by shorter steps."""
         if block.dense is not None:
@@ -253,6 +273,10 @@ class Stepper(ABC):
             else estimated
         )
         return own or self.every_step or span.times is None or self.events is not None or self.modes is not None
+
+    @abstractmethod
+    def _aim(self, t: float) -> None:
+        """Go on to this end."""
 
     @abstractmethod
     def _recorded(self, span: Span, looked: bool) -> Iterator[StepBlock]:
@@ -357,6 +381,7 @@ class EqualStepper(Stepper):
                     self.status = self._too_many()
                     return
                 before, t_old, x_old = self._memory.copy(), self.t, self.x.copy()
+                longest = min(longest, self._passes) if self._passes == 1 else longest
                 rows, done = self._rows(int(min(self._left, most - self.steps, longest)), looked)
                 longest = min(2 * longest, LONGEST_BLOCK) if self.modes is not None else math.inf
                 if self._numbers[self._stop]:
@@ -372,6 +397,10 @@ class EqualStepper(Stepper):
                     yield StepBlock(t, x, begin, t - begin, starts, None, self.program.normalization)
                 if self.status:
                     return
+
+    def _aim(self, t: float) -> None:
+        if not self.stretches or self.stretches[-1].end != t:
+            self.stretches = equal_steps([self.t, t], self.options.step)
 
     def _enter(self, stretch: EqualSteps) -> None:
         self._stretch, self._left = stretch, stretch.steps
@@ -454,11 +483,15 @@ class ChosenStepper(Stepper):
         self._count_trials()
         return not self.status and self._number("at_limit") < HELD
 
-    def advance(self, t: float, *, single: bool = False) -> None:
-        """Go on to t, or by a single step."""
+    def _aim(self, t: float) -> None:
         numbers, at = self._numbers, self._at
         numbers[at[GOAL] if numbers[at["anew"]] else at["end"]] = t
         numbers[self._stop] = RUNNING
+
+    def advance(self, t: float, *, single: bool = False) -> None:
+        """Go on to t, or by a single step."""
+        numbers, at = self._numbers, self._at
+        self._aim(t)
         self._repeat(1 if single else 2**62)
         while single and numbers[at["row"]] <= 0.0 and numbers[self._stop] == RUNNING:
             self._repeat(1)

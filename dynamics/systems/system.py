@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -295,21 +295,24 @@ def _kinetic_and_potential(lagrangian: Node, velocities: Sequence[Node]) -> tupl
     for node in topological([lagrangian]):
         if any(arg in moving for arg in node.args):
             moving.add(node)
-    kinetic: list[Node] = []
-    potential: list[Node] = []
-    stack = [(1, lagrangian)]
+    terms = list(signed_terms(lagrangian, moving))
+    kinetic = [node if sign > 0 else -node for sign, node in terms if node in moving]
+    return _sum(kinetic), _sum([node if sign < 0 else -node for sign, node in terms if node not in moving])
+
+
+def signed_terms(total: Node, among: Collection[Node] | None = None) -> Iterator[tuple[int, Node]]:
+    """The terms of a sum with their signs, in their order.  among: nodes that are taken apart, by default all."""
+    stack = [(1, total)]
     while stack:
         sign, node = stack.pop()
-        if node.op.name in ("add", "sub") and node in moving:
+        parts = among is None or node in among
+        if parts and node.op.name in ("add", "sub"):
             a, b = node.args
             stack += [(-sign if node.op.name == "sub" else sign, b), (sign, a)]
-        elif node.op.name == "neg" and node in moving:
+        elif parts and node.op.name == "neg":
             stack.append((-sign, node.args[0]))
-        elif node in moving:
-            kinetic.append(node if sign > 0 else -node)
         else:
-            potential.append(node if sign < 0 else -node)
-    return _sum(kinetic), _sum(potential)
+            yield sign, node
 
 
 def _sum(nodes: Sequence[Node]) -> Node:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -19,7 +19,8 @@ from ..equations.states.evaluate import evaluate
 from ..io.load import compiled
 from ..io.mujoco_module import mujoco
 from ..io.mujoco_twin import MujocoTwin, joint_order
-from ..multibody.bodies.body import Body, MechanismError
+from ..multibody.bodies.body import MechanismError
+from ..multibody.changes.switched_effects import without_effect
 from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..systems.model import Model
 from .pinocchio_bodies import PinocchioBodies, constrained_accelerations
@@ -49,24 +50,11 @@ def sizes_of(mechanism: Mechanism) -> Sizes:
     return Sizes(TINY_MASS * max(float(body.mass) for body in mechanism.bodies), inertia)
 
 
-def _as_it_is(part: Any, *_: Sizes) -> Any:
-    return part
-
-
 class Term(NamedTuple):
-    """A term of the equations, and how both sides are made alike in it.
-
-    theirs: the change to MuJoCo's model of a file.
-    body, rest: the change to each body of a mechanism, and to the rest of it.
-    """
+    """A term of the equations, and how MuJoCo's model of a file and our mechanism are made alike in it."""
 
     theirs: Callable[[MjModel, Sizes], object]
-    body: Callable[[Body, Sizes], Body] = _as_it_is
-    rest: Callable[[Mechanism], Mechanism] = _as_it_is
-
-
-def _joint(**changes: Any) -> Callable[[Body, Sizes], Body]:
-    return lambda body, sizes: replace(body, joint=replace(body.joint, **changes))
+    ours: Callable[[Mechanism, Sizes], Mechanism] = lambda mechanism, sizes: mechanism
 
 
 def _zeroed(*fields: str) -> Callable[[MjModel, Sizes], None]:
@@ -81,18 +69,24 @@ def _zeroed(*fields: str) -> Callable[[MjModel, Sizes], None]:
     return change
 
 
+def _switched_off(effect: str, *fields: str) -> Term:
+    """One of `EFFECTS`, and its fields in MuJoCo."""
+    return Term(_zeroed(*fields), lambda mechanism, sizes: cast("Mechanism", without_effect(mechanism, effect)))
+
+
 def _heavy(value: str, field: str, count: int) -> Term:
     """A stand-in of `Sizes` for a number of all bodies that have mass."""
 
-    def body(body: Body, sizes: Sizes) -> Body:
+    def ours(mechanism: Mechanism, sizes: Sizes) -> Mechanism:
         stand_in = getattr(sizes, field)
         changes: dict[str, Any] = {field: (stand_in,) * count if count > 1 else stand_in}
-        return replace(body, **changes) if float(body.mass) > sizes.mass else body
+        bodies = [replace(body, **changes) if float(body.mass) > sizes.mass else body for body in mechanism.bodies]
+        return replace(mechanism, bodies=tuple(bodies))
 
     def theirs(mj: MjModel, sizes: Sizes) -> None:
         getattr(mj, value)[mj.body_mass > sizes.mass] = getattr(sizes, field)
 
-    return Term(theirs, body)
+    return Term(theirs, ours)
 
 
 def _unbound(mj: MjModel, sizes: Sizes) -> None:
@@ -100,10 +94,10 @@ def _unbound(mj: MjModel, sizes: Sizes) -> None:
 
 
 TERMS: dict[str, Term] = {
-    "damping": Term(_zeroed("dof_damping", "dof_dampingpoly"), _joint(damping=0.0)),
-    "joint springs": Term(_zeroed("jnt_stiffness", "jnt_stiffnesspoly"), _joint(stiffness=0.0)),
-    "armature": Term(_zeroed("dof_armature"), _joint(armature=0.0)),
-    "gravity": Term(_zeroed("gravity"), rest=lambda mechanism: replace(mechanism, gravity=(0.0, 0.0, 0.0))),
+    "damping": _switched_off("damping", "dof_damping", "dof_dampingpoly"),
+    "joint springs": _switched_off("springs", "jnt_stiffness", "jnt_stiffnesspoly"),
+    "armature": _switched_off("armature", "dof_armature"),
+    "gravity": _switched_off("gravity", "gravity"),
     "inertia about the centers of mass": _heavy("body_inertia", "inertia", 3),
     "mass and its place": _heavy("body_mass", "mass", 1),
     "tendons": Term(_zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
@@ -115,32 +109,14 @@ TERMS: dict[str, Term] = {
 def without(mechanism: Mechanism, terms: Sequence[str], sizes: Sizes) -> Mechanism:
     """The mechanism with these of the `TERMS` taken out, or made alike for all."""
     for name in terms:
-        term = TERMS[name]
-        rest = term.rest(mechanism)
-        mechanism = replace(rest, bodies=tuple([term.body(body, sizes) for body in rest.bodies]))
+        mechanism = TERMS[name].ours(mechanism, sizes)
     return mechanism
-
-
-class Bodies(Protocol):
-    """Bodies in a peer."""
-
-    def inverse(self, at: Mapping[str, Array]) -> Array:
-        """tau, (N, n), of q, qd, qdd, (N, n) each."""
-        ...
-
-
-class Asked(Bodies, Protocol):
-    """A peer that has the model."""
-
-    def without(self, terms: Sequence[str], sizes: Sizes) -> Asked:
-        """The peer with these of the `TERMS` taken out."""
-        ...
 
 
 class Translation:
     """A peer on our mechanism, which `make` gives it."""
 
-    def __init__(self, make: Callable[[Mechanism], Bodies], mechanism: Mechanism) -> None:
+    def __init__(self, make: Callable[[Mechanism], Original | PinocchioBodies], mechanism: Mechanism) -> None:
         self.make, self.mechanism = make, mechanism
         self.inverse = make(mechanism).inverse
 
@@ -180,7 +156,7 @@ def twin_of(mechanism: Mechanism) -> Original:
     return Original(twin.model, *joint_order(twin.model, mechanism))
 
 
-def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
+def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Translation | Original]]]:
     """Name of each peer, and what makes it for a model: raises UnavailableError with the reason.
 
     twin: MuJoCo's, in place of the translation.
@@ -189,7 +165,7 @@ def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Cal
     yield "Pinocchio", lambda: _translated(PinocchioBodies, model)
 
 
-def residual(name: str, peer: Asked, model: Model, at: Mapping[str, Array]) -> Residual:
+def residual(name: str, peer: Translation | Original, model: Model, at: Mapping[str, Array]) -> Residual:
     """Difference of the inverse dynamics of a peer from ours, with the terms that explain it where it is too large."""
     bodies = bare(model)
     value = disagreement(bodies, peer, at)
@@ -197,7 +173,7 @@ def residual(name: str, peer: Asked, model: Model, at: Mapping[str, Array]) -> R
     return Residual(f"inverse dynamics = {name}'s", value, PEERS, note)
 
 
-def explanation(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
+def explanation(model: Mechanism, peer: Translation | Original, at: Mapping[str, Array]) -> str:
     """The one or two of the `TERMS` without which there is agreement, in words."""
     few, sizes = {name: rows[:ASKED] for name, rows in at.items()}, sizes_of(model)
     for count in range(1, TAKEN + 1):
@@ -208,7 +184,7 @@ def explanation(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
     return f"no {TAKEN} terms explain it"
 
 
-def disagreement(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> float:
+def disagreement(model: Mechanism, peer: Translation | Original, at: Mapping[str, Array]) -> float:
     """The largest difference of the torques, relative to the largest torque of its state; over all states."""
     ours = evaluate(model, inverse_dynamics(model), at)
     size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
@@ -253,7 +229,7 @@ def _without_forces(model: Model) -> Mechanism:
     return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
 
 
-def _translated(make: Callable[[Mechanism], Bodies], model: Model) -> Translation:
+def _translated(make: Callable[[Mechanism], Original | PinocchioBodies], model: Model) -> Translation:
     try:
         return Translation(make, bare(model))
     except (ImportError, UnavailableError, MechanismError) as error:

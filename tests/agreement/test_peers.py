@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.verification.residual import UnavailableError
 from tests.agreement.agreement import QUANTITIES, differences, random_arm
 from tests.bench.peers import PEERS, PeerModel
 from tests.bench.peers.peer import BATCH, DERIVATIVES, DT, MODES, MOTIONS, NUDGE, PASSES, TASKS
 from tests.bench.speed.scenes import free_tree, load
 from tests.each_row import each_row
+from tests.mujoco_twin import AskedTwin
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
 # Of quotients of differences, with steps of 5e-4: their rounding is 1e-12, what they leave out 1e-10.
@@ -27,7 +27,7 @@ class Reference:
 
     def __init__(self, case: PeerModel) -> None:
         pytest.importorskip("mujoco")
-        self.n, self.twin = case.n, MujocoTwin(case.model)
+        self.n, self.twin = case.n, AskedTwin(case.model)
         names = case.model.coordinates
         self.order = np.array([self.twin.model.joint(name).id for name in names])
 
@@ -169,7 +169,7 @@ def floating():
 )
 def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
     case, one, ours = floating
-    if name in ("heyoka", "sympy", "torch") or (name, task) == ("pinocchio", "rk4"):
+    if name == "heyoka" or (name, task) == ("pinocchio", "rk4"):
         with pytest.raises(UnavailableError, match="rates of"):
             prepared(name, case, task, mode)
         return
@@ -181,7 +181,7 @@ def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
     assert difference(found, expected, x if task == "rk4" else 0.0) < ROUNDING
 
 
-@pytest.mark.parametrize("name", [name for name in PEERS if name != "torch"])
+@pytest.mark.parametrize("name", PEERS)
 def test_a_peer_takes_parameters_and_applied_forces(name):
     system = dyn.System(
         lambda q, qd, t, p: 0.5 * p["I"] * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2,

@@ -39,48 +39,21 @@ class Bench(NamedTuple):
 READING = ("ignore", "floating", "limits", "friction", "actuators", "contacts")
 OF_SPEED = (*READING, "tasks", "modes", "peers", "quick", "budget", "repeats")
 OF_MOTIONS = ("times", "errors", "peers", "quick", "repeats", "count")
-SIDE, STAGES = "bench.speed.beside_peers", "bench.speed.stages"
-# fmt: off   (a table is read by columns)
+# A table is read by columns.
+# fmt: off
 BENCHES = {
     SPEED: Bench("run times of tasks beside other software (default)", "bench.speed.bench.bench", OF_SPEED, rows=True),
     MOTIONS: Bench("what ends of motions cost at equal true error", "bench.motions.motions.motions", OF_MOTIONS, True),
-    "counts": Bench(
-        "nodes of forward dynamics, and what leaving out one idea adds", "bench.speed.counts.node_counts", ("links",)
-    ),
-    "operations": Bench(
-        "products and sums of robots' equations beside published ones",
-        "bench.speed.counts.operation_counts",
-        ("links",),
-    ),
-    "build": Bench("time to build the graph of forward dynamics", f"{STAGES}.build_time", ("links", "repeats")),
-    "compile": Bench("time to compile chains, and derivatives of them", f"{STAGES}.compile_time", ("links",)),
-    "long-chains": Bench("cost of a thousand links, and accuracy of long chains", f"{STAGES}.long_chains", ("links",)),
-    "agreement": Bench(
-        "largest differences from MuJoCo and Pinocchio", "agreement.agreement.agreement", ("links", "count")
-    ),
-    "ensembles": Bench(
-        "many pendulums beside MuJoCo's rollout and JAX's vmap", f"{SIDE}.ensembles", ("count", "repeats")
-    ),
-    "closed-chains": Bench(
-        "chains pinned at the tip beside Pinocchio and MuJoCo", f"{SIDE}.closed_chains", ("repeats",)
-    ),
-    "reconfiguration": Bench(
-        "first torque after a change of structure", "bench.speed.reconfiguration.reconfiguration", ("links", "repeats")
-    ),
-    "trust": Bench(
-        "random motions with exact answers: runs right, said to be wrong, silent",
-        "trust.cascades.with_cascades",
-        ("count",),
-    ),
-    "tightest": Bench(
-        "random Lagrangians as exactly as float64 has them, beside heyoka",
-        "trust.tightest.tightest",
-        ("count",),
-    ),
-    "hybrid": Bench(
-        "random systems with switching surfaces: ends, events and slopes right, said to be wrong, silent",
-        "bench.hybrid.hybrid",
-        ("count", "seed", "methods", "cases"),
-    ),
+    "counts": Bench("nodes of forward dynamics, and what leaving out one idea adds", "bench.speed.counts.node_counts", ("links",)),
+    "operations": Bench("products and sums of robots' equations beside published ones", "bench.speed.counts.operation_counts", ("links",)),
+    "compile": Bench("time to compile chains, and derivatives of them", "bench.speed.stages.compile_time", ("links",)),
+    "long-chains": Bench("cost of a thousand links, and accuracy of long chains", "bench.speed.stages.long_chains", ("links",)),
+    "agreement": Bench("largest differences from MuJoCo and Pinocchio", "agreement.agreement.agreement", ("links", "count")),
+    "ensembles": Bench("many pendulums beside MuJoCo's rollout and JAX's vmap", "bench.speed.ensembles.ensembles", ("count", "repeats")),
+    "reconfiguration": Bench("first torque after a change of structure", "bench.speed.reconfiguration.reconfiguration", ("links", "repeats")),
+    "trust": Bench("random motions with exact answers: runs right, said to be wrong, silent", "trust.cascades.with_cascades", ("count",)),
+    "tightest": Bench("random Lagrangians as exactly as float64 has them, beside heyoka", "trust.tightest.tightest", ("count",)),
+    "hybrid": Bench("random systems with switching surfaces: ends, events and slopes right, said to be wrong, silent",
+                    "bench.hybrid.hybrid", ("count", "seed", "methods", "cases")),
 }
 # fmt: on

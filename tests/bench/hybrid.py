@@ -6,27 +6,23 @@ import math
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 import dynamics as dyn
-from cgraph._shared import Array
 from cgraph.codegen import llvm_engine
 from dynamics.integrators import METHODS
-from tests.bench.hybrids.exact import PoorDrawError, solution
-from tests.bench.hybrids.families import FAMILIES, Case, Draw, case, draw
+from tests.bench.hybrids.families import FAMILIES, TINY, Case, Draw, case, drawn
 from tests.bench.hybrids.members import EACH, KNOWN, members
 from tests.bench.tables import Table, Wrong
 
 RIGHT, SAID, SILENT = "right", "said", "silent"
 OTHERS = ("dopri5", "radau", "rodas", "rk4", "taylor")  # beside the default, one of them a case
 VALUES, SLOPES = 1e-6, 1e-4  # errors that are right, relative to the largest of a component over the run, of all slopes
-EQUAL, STEPS = 1e-5, 1000  # the first of equal steps, of which a run has so many
-MOST = 20_000  # steps, after which a run stops and says so
-GROWTH = 300.0  # times which an error of the start may have grown at the end
-TINY = 1e-30  # of plain numbers, what is rounding
+STEPS, MOST = 1000, 20_000  # equal steps of a run; steps after which a run stops and says so
 
 
 class Verdict(NamedTuple):
@@ -36,36 +32,6 @@ class Verdict(NamedTuple):
     again: str
     verdict: str
     words: str
-
-
-class Truth(NamedTuple):
-    """A case, and its right end, sizes and slopes, (states, inputs)."""
-
-    case: Case
-    end: Array
-    sizes: Array
-    slopes: Array | None
-
-
-def truth(case: Case) -> Truth:
-    """What is right of a case."""
-    if case.exact is None:
-        return Truth(case, np.array(case.right), np.array(case.sizes), None)
-    end, sizes, slopes = solution(case.exact, case.start, case.numbers, case.t_end, case.slopes)
-    return Truth(case, end, np.where(sizes > TINY, sizes, 1.0), slopes)
-
-
-def drawn(seed: int) -> Truth:
-    """The case of a seed: its first draw that is none on the verge."""
-    family = FAMILIES[seed % len(FAMILIES)]
-    for again in range(1000):
-        try:
-            found = truth(draw(family, seed // len(FAMILIES), 1000 * seed + again))
-        except PoorDrawError:
-            continue
-        if found.slopes is None or np.abs(found.slopes).max() < GROWTH * found.sizes.max():
-            return found
-    raise RuntimeError(f"no draw of {family} with seed {seed} can be judged")
 
 
 def heard(run: Callable[[], Any]) -> tuple[Any, str]:
@@ -87,55 +53,40 @@ def verdict(name: str, again: str, got: Any, right: Any, size: Any, bound: float
     return Verdict(name, again, RIGHT if error <= bound else SAID if words else SILENT, text)
 
 
-def judged(truth: Truth, name: str, again: str, method: str, ways: Sequence[Callable[..., Any]]) -> Iterator[Verdict]:
-    """The verdicts on the end or the events of a case by a method, and on its slopes in these ways."""
-    case, units = truth.case, np.array(truth.case.units)
-    options: dict[str, Any] = {"events": case.events}
-    bound = VALUES
+def judged(of: Case, name: str, again: str, method: str, ways: Sequence[bool]) -> Iterator[Verdict]:
+    """The verdicts on the end or the events of a case by a method, and its slopes: all, or those of one place."""
+    options: dict[str, Any] = {"events": of.events}
     if not METHODS[method].adaptive:
-        options["dt"], bound = case.t_end * case.second / STEPS, EQUAL
-    half = len(units) if isinstance(case.model, dyn.OdeSystem) else len(units) // 2
-    state = np.array(case.start) * units
-    start = state[:half], state[half:] if half < len(units) else None, case.t_end * case.second
-    run, words = heard(lambda: dyn.simulate(case.model, *start, method, max_steps=MOST, progress=False, **options))
-    if run is None or not run.stats.success:
-        yield verdict(name, again, None, truth.end, 1.0, bound, words)
+        options["dt"] = of.t_end / STEPS
+    bound, half = of.equal if "dt" in options else VALUES, [*of.start, None][:2]
+    simulate = partial(dyn.simulate, of.model, *half, of.t_end, method, max_steps=MOST, progress=False, **options)
+    run, words = heard(simulate)
+    got = None
+    if run is not None and run.stats.success:
+        times = [each.t / of.t_end for each in run.events.values()]
+        got = np.hstack(times) if of.timed else np.hstack([run.q[-1], run.qd[-1]]) / of.units
+    yield verdict(name, again, got, of.right, of.sizes, bound, words)
+    if of.slopes is None or got is None:
         return
-    if case.times is not None:
-        times = np.hstack([each.t for each in run.events.values()]) / case.second
-        yield verdict(name, again, times, case.times, case.t_end, bound, words)
-        return
-    yield verdict(name, again, np.hstack([run.q[-1], run.qd[-1]]) / units, truth.end, truth.sizes, bound, words)
-    if truth.slopes is None:
-        return
-    factors = np.hstack([units, [case.unit[each] * value for each, value in case.numbers.items()]])
-    names, largest = ["q", *["qd"] * (half < len(units)), *case.numbers], np.abs(truth.slopes).max()
-    for way in ways:
-        found, words = heard(lambda way=way: way(case.model, start, method, names, **options))
-        right = truth.slopes[:1] if way is gradient else truth.slopes
-        got = None if found is None else found * factors / units[: len(found), None]
-        yield verdict(name, again, got, right, largest if largest > TINY else 1.0, SLOPES, words)
-
-
-def gradient(model: Any, start: Any, method: str, names: Sequence[str], **options: Any) -> Array:
-    """Slopes of the first coordinate, a row."""
-    found = dyn.gradient(model, lambda q, *_: q[0], *start, method, wrt=names, **options)
-    return np.hstack([found[each] for each in names])[None]
-
-
-def sensitivities(model: Any, start: Any, method: str, names: Sequence[str], **options: Any) -> Array:
-    """Slopes of all states, a row each."""
-    found = dyn.sensitivities(model, *start, method, wrt=names, **options)
-    return np.hstack([np.reshape(found[each][-1], (len(found[each][-1]), -1)) for each in names])
+    names, largest = [*["q", "qd"][: len(of.start)], *of.numbers], np.abs(of.slopes).max()
+    for whole in ways:
+        count = len(of.units) if whole else 1
+        ask = partial(dyn.sensitivities, of.model) if whole else partial(dyn.gradient, of.model, lambda q, *_: q[0])
+        found, words = heard(partial(ask, *half, of.t_end, method, wrt=names, **options))
+        if found is not None:
+            found = np.hstack([np.reshape(found[each][-1] if whole else found[each], (count, -1)) for each in names])
+            found = found * np.hstack([of.units, [*of.numbers.values()]]) / of.units[:count, None]
+        size = largest if largest > TINY else 1.0
+        yield verdict(name, again, found, of.slopes[:count], size, SLOPES, words)
 
 
 def random_verdicts(count: int, seed: int, methods: Sequence[str]) -> Iterator[Verdict]:
     """The verdicts on cases of these seeds, by these methods; or by the default and another, slopes by one of them."""
     for each in range(seed, seed + count):
-        found, u, ways = drawn(each), Draw(each), (gradient, sensitivities)
-        pair, sloped, way = ("dop853", OTHERS[u.pick(len(OTHERS))]), u.pick(2), ways[u.pick(2)]
+        found, u = drawn(each), Draw(each)
+        pair, sloped, way = ("dop853", OTHERS[u.pick(len(OTHERS))]), u.pick(2), bool(u.pick(2))
         for k, method in enumerate(methods or pair):
-            asked = ways if methods else (way,) * (k == sloped)
+            asked = (False, True) if methods else (way,) * (k == sloped)
             again = f"--seed {each} --count 1 --methods {method}"
             yield from judged(found, FAMILIES[each % len(FAMILIES)], again, method, asked)
 
@@ -144,10 +95,10 @@ def known_verdicts() -> Iterator[Verdict]:
     """The verdicts on known members."""
     for name, row in KNOWN.items():
         for method in EACH:
-            yield from judged(truth(case(row, Draw())), name, method, method, (gradient, sensitivities))
-    for member in members():
-        got, words = heard(member.ask)
-        yield verdict(member.name, member.method, got, member.right, np.abs(member.right).max(), member.bound, words)
+            yield from judged(case(row, Draw()), name, method, method, (False, True))
+    for name, method, ask, right, bound in members():
+        got, words = heard(ask)
+        yield verdict(name, method, got, right, np.abs(right).max(), bound, words)
 
 
 def hybrid(count: int = 300, seed: int = 0, methods: Sequence[str] = (), cases: bool = False) -> Iterator[Table | str]:
@@ -155,11 +106,10 @@ def hybrid(count: int = 300, seed: int = 0, methods: Sequence[str] = (), cases: 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(llvm_engine, "LEVEL", 0)  # most of the time would go into code that runs once
         found = list(known_verdicts() if cases else random_verdicts(count, seed, methods))
-    rows = []
-    for name in dict.fromkeys([each.name for each in found]):
-        counts = Counter([each.verdict for each in found if each.name == name])
-        rows.append([name, str(counts.total()), *[str(counts[each]) for each in (RIGHT, SAID, SILENT)]])
-    yield Table("Systems with switching surfaces", ["", "judged", RIGHT, SAID, SILENT], rows)
+    counts = Counter([(each.name, each.verdict) for each in found])
+    names = dict.fromkeys([each.name for each in found])
+    rows = [[name, *[str(counts[name, each]) for each in (RIGHT, SAID, SILENT)]] for name in names]
+    yield Table("Systems with switching surfaces", ["", RIGHT, SAID, SILENT], rows)
     for each in found:
         line = f"{each.verdict}: {each.name}, {each.again}: {each.words}"
         if each.verdict == SILENT:

@@ -12,6 +12,7 @@ import pytest
 from dynamics.experiments.timing import machine
 from tests.bench import __main__ as command
 from tests.bench.benches import BENCHES, MOTIONS, SPEED, Bench
+from tests.bench.hybrid import RIGHT, random_verdicts
 from tests.bench.speed import stages
 from tests.bench.timing import run_fresh
 from tests.each_row import each_row
@@ -26,13 +27,11 @@ SMALLEST: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     MOTIONS: ({**HENON, "repeats": 1}, ("heyoka",)),
     "counts": ({"links": 3}, ()),
     "operations": ({"links": 3}, ()),
-    "build": ({"links": 3, "repeats": 1}, ()),
     "compile": ({"links": 2}, ()),
     "agreement": ({"links": 1, "count": 1}, ("mujoco", "pinocchio")),
     "ensembles": ({"count": 10, "repeats": 1}, ("mujoco", "jax")),
     "reconfiguration": ({"links": 4, "repeats": 1}, ("mujoco",)),
     "trust": ({"count": 2}, ()),
-    "closed-chains": ({"repeats": 1, "sizes": (3,)}, ("pinocchio", "mujoco")),
     "long-chains": ({"links": 3, "sizes": (("planar", 3),)}, ()),
 }
 SLOW = ("trust", "compile", "long-chains")  # by many methods, or in processes of their own
@@ -85,7 +84,7 @@ def speed_row() -> Any:
         (["counts", "planar 3"], "counts has models of its own and takes no scene, got 'planar 3'"),
         (["counts", "--tasks", "forward"], "--tasks does not go with counts, which takes --links"),
         (["speed", "--links", "3"], "--links does not go with speed"),
-        (["build", "--links", "0"], "--links must be at least 1, got 0"),
+        (["compile", "--links", "0"], "--links must be at least 1, got 0"),
         (["counts", "--links", "1"], "the smallest model that is counted has 3 links, got links = 1"),
         (["planar 4"], "there is no scene 'planar 4'"),
     ],
@@ -93,6 +92,13 @@ def speed_row() -> Any:
 def test_a_wrong_choice_gets_one_line(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(arguments) == 2
     assert said in capsys.readouterr().err
+
+
+def test_random_systems_with_switching_surfaces_come_out_right() -> None:
+    seeds = 0, 3, 8, 10, 13, 41  # a switch, a belt, spheres, a gate, a kink, and two joints at an instant
+    found = [each for seed in seeds for each in random_verdicts(1, seed, ("dop853",))]
+    assert [each for each in found if each.verdict != RIGHT] == []
+    assert len(found) == len(seeds) + 2 * 3  # slopes of three of them, two ways
 
 
 def test_elimination_is_accurate_on_long_chains_and_dense_solves_are_less_so() -> None:

@@ -5,7 +5,7 @@ from contextlib import suppress
 from typing import NamedTuple, TypeVar
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph.extend import (
     OPS,
     Builder,
@@ -53,18 +53,6 @@ class MassSolve(NamedTuple):
     def size(self, sides: int) -> int:
         """Number of nodes of the solutions of so many right-hand sides, about."""
         return len(topological(self.x)) + sides * len(self.column)
-
-    def split(self) -> tuple[list[Node], Graph]:
-        """Factors that a column reads, and the graph of a column: inputs p0.., the factors, b0..; outputs x0..."""
-        moving = {*self.b, *self.column}
-        read = dict.fromkeys([arg for node in self.column for arg in node.args if arg not in moving])
-        factors = [node for node in read if node.value is None]
-        p = cg.variables([f"p{k}" for k in range(len(factors))])
-        b = cg.variables([f"b{i}" for i in range(len(self.b))])
-        new = dict(zip([*factors, *self.b], [*p, *b], strict=True))
-        for node in self.column:
-            new[node] = Node(node.op, tuple([new.get(arg, arg) for arg in node.args]), node.label)
-        return factors, Graph([*p, *b], {f"x{i}": new.get(node, node) for i, node in enumerate(self.x)})
 
 
 def mass_solve(system: System, build: Builder, method: str) -> MassSolve:

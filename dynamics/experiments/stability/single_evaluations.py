@@ -6,8 +6,6 @@ centre and inertia, damping, gravity), the error is
 The sum is what a relative change of each x_j makes of y_i: the componentwise condition, in the maximum norm. So 1 is
 what rounding the data once would do, whatever the algorithm. The derivatives are the graph's own (`cg.jvp`, of an arm
 whose parameters are inputs), and so are the exact values: the same graph in 200 digits.
-
-Besides, sine and cosine of the backends at random angles of every size, in ulps of the exact value.
 """
 
 from __future__ import annotations
@@ -28,7 +26,7 @@ from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations.formulations import inverse_dynamics
 from ...multibody.builders.planar_arm import planar_arm, planar_links
 from ...multibody.trees.mechanism import Mechanism
-from ...multiprecision.decimal_numbers import mpmath_context, working
+from ...multiprecision.decimal_numbers import working
 from ...multiprecision.graph_values import values_in_digits
 from ...systems.system import System
 from .case_result import CaseResult, Measurement, reason
@@ -210,53 +208,3 @@ def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[Any], grav
         r = link.length
         x, y, height = x + r * omega * c, y + r * omega * s, height - r * c
     return partials
-
-
-SINES, SINE_CASE = "Sine and cosine", "sine and cosine"
-SINE_BOUND = 2.0  # ulp, what cgraph promises of its polynomials; a correctly rounded value is within half of one
-COUNT, QUICK_COUNT = 4000, 500  # angles of each range
-RANGES: dict[str, tuple[float, float]] = {  # decimal exponents
-    "1e-300 .. 1": (-300.0, 0.0),
-    "1 .. 1e6": (0.0, 6.0),
-    "1e6 .. 1e9": (6.0, 9.0),
-    "1e9 .. 1e16": (9.0, 16.0),
-    "1e16 .. 1e308": (16.0, 308.0),
-}
-
-
-def sine_results(count: int = COUNT, backends: Sequence[str] | None = None) -> Iterator[CaseResult]:
-    """A result for each backend, at single points and in a batch, with a measurement for each range of angles."""
-    x = cg.variable("x")
-    graph = cg.Graph([x], {"sin": cg.sin(x), "cos": cg.cos(x)})
-    points = {name: angles(low, high, count) for name, (low, high) in RANGES.items()}
-    known = {name: exact(each) for name, each in points.items()}
-    for backend in backends or available():
-        function = cg.compile(graph, backend)
-        alone = {name: np.array([function([x]) for x in each.tolist()]).T for name, each in points.items()}
-        together = {name: function.batch(each[None]) for name, each in points.items()}
-        for way, values in ((backend, alone), (f"{backend}, batch", together)):
-            off = {name: ulps(values[name], known[name]) for name in RANGES}
-            rows = tuple(
-                [Measurement(f"{name} rad", off[name], SINE_BOUND, "ulp", "of the exact value") for name in off]
-            )
-            about = f"{count} random angles of each range, both signs"
-            yield CaseResult(SINES, SINE_CASE, about, way, rows, reason=reason(SINES, SINE_CASE, way, rows))
-
-
-def angles(low: float, high: float, count: int) -> Array:
-    """Random angles, their logarithms uniform, and of both signs."""
-    rng = np.random.default_rng(SEED)
-    sizes: Array = 10.0 ** rng.uniform(low, high, count)
-    return np.where(rng.random(count) < 0.5, -sizes, sizes)
-
-
-def exact(points: Array) -> Any:
-    """Sine and cosine in numbers of mpmath, (2, N)."""
-    mp = mpmath_context(DIGITS)
-    return np.array([[function(x) for x in points.tolist()] for function in (mp.sin, mp.cos)], dtype=object)
-
-
-def ulps(values: Array, known: Any) -> float:
-    """The largest error."""
-    off = np.abs(values - known).astype(np.float64)
-    return float(np.max(off / np.spacing(np.abs(known.astype(np.float64)))))

@@ -42,7 +42,6 @@ ABOUT = {
     "component's size, where a size is |y_i| + sum_j |dy_i/dx_j| |x_j| over all inputs and parameters: the "
     "componentwise condition. 1 is what rounding the data once would do. Exact values from the same equations, "
     "with all data as inputs, in 200 digits; the worst of five random states, backends, single points and batches.",
-    single_evaluations.SINES: "The largest error over random angles, in units of the last place of the exact value.",
 }
 
 
@@ -65,7 +64,6 @@ def results(quick: bool = False) -> Iterator[CaseResult]:
     yield from case_runs.results(QUICK if quick else None)
     yield from energy_drift.results(energy_drift.QUICK if quick else energy_drift.STEPS)
     yield from single_evaluations.results(single_evaluations.QUICK if quick else single_evaluations.LINKS)
-    yield from single_evaluations.sine_results(single_evaluations.QUICK_COUNT if quick else single_evaluations.COUNT)
 
 
 def to_dict(rows: Sequence[CaseResult], seconds: float, quick: bool = False) -> dict[str, Any]:

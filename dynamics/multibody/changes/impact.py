@@ -14,7 +14,7 @@ from ...equations.equations_of_motion import forward_dynamics, momentum
 from ...equations.states.evaluate import arrays_at
 from ..bodies.body import Body, MechanismError, vector
 from ..trees.mechanism import Mechanism, require_mechanism
-from ..trees.structure import bound_body
+from ..trees.structure import bound_body, checked_parts
 
 _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
 
@@ -157,7 +157,7 @@ def attach_with_impact(
     alone = _inertia_alone(mechanism.bind())
     before = arrays_at(alone, momentum(alone), q, qd)["p"]
     p[[index[name] for name in mechanism.velocities]] = before
-    given = whole.shared.parts(bound_body(body, whole.parameter_values))[-1]
+    given = checked_parts(bound_body(body, whole.parameter_values))[-1]
     mass = float(given.mass)
     free, linear, angular = _motion(whole.bind(), given, q_new, qd_old)
     inertia = free.orientation @ np.asarray(given.inertia) @ free.orientation.T
@@ -207,7 +207,7 @@ def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Rel
     rest = mechanism.detach(body)
     values = real_array("q", q), real_array("qd", qd)
     q_rest, qd_rest = rest.map_state_from(mechanism, *values)
-    given = mechanism.shared.parts(bound_body(bodies[0], mechanism.parameter_values))[-1]
+    given = checked_parts(bound_body(bodies[0], mechanism.parameter_values))[-1]
     free, _, _ = _motion(mechanism.bind(), given, *values)
     return Released(rest, q_rest, qd_rest, free)
 

@@ -16,7 +16,7 @@ from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
 from ..algebra.turns import MatrixTurn
-from ..bodies.body import WORLD, quantities
+from ..bodies.body import quantities
 from ..bodies.joint_coordinates import quasi_velocities
 from ..sweeps.links import Link, axes_of, link, link_states
 from ..sweeps.outward import energy, ground, motions
@@ -89,15 +89,15 @@ def inertial_parameters(model: Model) -> Array:
 
 
 def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi: list[Node]) -> list[Node]:
-    axes = {body.name: axes_of(body) for body in mechanism.moving} | {WORLD: np.eye(3)}
+    bodies = {body.name: body for body in mechanism.moving}
     base = ground(quantities("gravity", mechanism.gravity))
     partials = []
     with building(Builder()):
-        links = [link(body, axes[body.parent]) for body in mechanism.moving]
+        links = [link(body, bodies.get(body.parent)) for body in mechanism.moving]
         states = link_states(mechanism.moving, links, mechanism.parents, q, qd)
         for i, (at, motion) in enumerate(zip(states, motions(states, base), strict=True)):
             with cg.tag(at.name):
-                unknown = _symbolic(at.link, axes[at.name], pi[10 * i : 10 * i + 10])
+                unknown = _symbolic(at.link, axes_of(bodies[at.name]), pi[10 * i : 10 * i + 10])
                 partials.append(energy(motion, at._replace(link=unknown)))
     return partials
 

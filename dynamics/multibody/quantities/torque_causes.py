@@ -28,7 +28,7 @@ from ...equations.torque_parts.torque_table import TorqueTable
 from ...systems.arguments import new_variables
 from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system, display_names
-from ...systems.system import System
+from ...systems.system import System, signed_terms
 from ..changes.switched_effects import without_effect
 from ..forces.contact import Contact
 from ..forces.external_force import Force
@@ -150,7 +150,11 @@ def _potentials(system: System, mechanism: Mechanism | None, build: Builder) -> 
         return
     called, seen = display_names(system), dict[str, int]()
     for name, partial in _bodies(system):
-        for term in _terms(_with(system, partial).potential):
+        potential = _with(system, partial).potential
+        for sign, node in [
+            each for each in signed_terms(potential) if each[1].value is None
+        ]:  # constants have no slope
+            term = node if sign > 0 else -node
             text = Names(Graph([*system.q, *system.extra_inputs], {"P": term}), called).text(term, LONGEST_TERM)
             cause = f"potential {text}" if "%" not in text else "potential"
             cause = _of(cause, name)
@@ -160,22 +164,6 @@ def _potentials(system: System, mechanism: Mechanism | None, build: Builder) -> 
 
 def _slope(potential: Node, system: System, build: Builder) -> list[Node]:
     return system.kinematics.pulled_back(cotangents({potential: ONE}, system.q, build), build)
-
-
-def _terms(sum_: Node) -> list[Node]:
-    """The terms that a sum adds up, in their order."""
-    terms: list[Node] = []
-    stack = [(1, sum_)]
-    while stack:
-        sign, node = stack.pop()
-        if node.op.name in ("add", "sub"):
-            a, b = node.args
-            stack += [(-sign if node.op.name == "sub" else sign, b), (sign, a)]
-        elif node.op.name == "neg":
-            stack.append((-sign, node.args[0]))
-        elif node.value is None:  # a constant has no slope
-            terms.append(node if sign > 0 else -node)
-    return terms
 
 
 def _of_forces(system: System, mechanism: Mechanism | None, build: Builder) -> Iterator[tuple[str, list[Node]]]:

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import cgraph as cg
 from cgraph import Node
-from cgraph._shared import Array
+from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Builder, building
 
 from ..algebra import spatial
@@ -214,10 +215,11 @@ def inertia_in(axes: Array, body: Body) -> tuple[Any, Array, Array]:
     return mass, center, spatial.parallel_axis(about_center, mass, center)
 
 
-def link(body: Body, outer: Array) -> Link:
-    """The link of a body whose parent moves in the axes `outer`."""
-    axes, joint = axes_of(body), body.joint
-    with building(Builder()):
+@kept_by_first
+def link(body: Body, parent: Body | None) -> Link:
+    """The link of a checked body on its parent, None for the world."""
+    axes, outer, joint = axes_of(body), axes_of(parent) if parent else np.eye(3), body.joint
+    with building(Builder()), cg.tag(body.name):
         turn, place = spatial.joint_placement(outer, joint.orientation, np.asarray(joint.position), axes)
         mass, center, inertia = inertia_in(axes, body)
         moment = mass * center

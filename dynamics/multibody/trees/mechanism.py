@@ -41,7 +41,16 @@ from ..sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from ..sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from ..sweeps.links import Link
 from .joint_positions import skeleton
-from .structure import Structure, bound_body, bound_force, changed, listed, require_values, used_names
+from .structure import (
+    Structure,
+    bound_body,
+    bound_force,
+    changed,
+    checked_parts,
+    listed,
+    require_values,
+    used_names,
+)
 from .tree_equations import TreeEquations
 
 __all__ = [
@@ -116,7 +125,7 @@ class Mechanism(Structure):
         kinds = {"bodies": (Body,), "forces": (Force, JointForce, Contact), "loops": (Loop,), "left_out": (str,)}
         for what, allowed in kinds.items():  # kept, so that an iterator is read once
             object.__setattr__(self, what, listed(what, allowed, getattr(self, what)))
-        self._check_parameters([part for body in self.bodies for part in self.shared.parts(body)])
+        self._check_parameters([part for body in self.bodies for part in checked_parts(body)])
         seen: set[str] = set()
         for name in self.coordinates:
             if name in seen:
@@ -151,7 +160,7 @@ class Mechanism(Structure):
     @cached_property
     def parts(self) -> tuple[Body, ...]:
         """All bodies as the equations have them, parents first: a locked joint a weld, those of several parts apart."""
-        parts = [part for body in self.bodies for part in self.shared.parts(body)]
+        parts = [part for body in self.bodies for part in checked_parts(body)]
         require_parents(self.bodies)
         return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.locked))))
 
@@ -193,7 +202,7 @@ class Mechanism(Structure):
         moving, carriers = merge_fixed_bodies(self.parts)
         numbers = [bound_body(part, self.parameters) for part in self.parts]
         if numbers != list(self.parts):
-            numbers = [part for body in numbers for part in self.shared.parts(body)]
+            numbers = [part for body in numbers for part in checked_parts(body)]
         require_inertia(moving if numbers == list(self.parts) else merge_fixed_bodies(numbers)[0])
         return tuple(moving), carriers
 

@@ -1,6 +1,6 @@
-"""The structure of a mechanism: its fields, which of its numbers are parameters, what copies share, and modified ones.
+"""The structure of a mechanism: its fields, which of its numbers are parameters, and modified copies.
 
-Modified copies have joints locked and freed, and subtrees taken off and hung on.
+These have joints locked and freed, and subtrees taken off and hung on.
 """
 
 from __future__ import annotations
@@ -9,75 +9,24 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self, TypeVar
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
-from cgraph import Node
 from cgraph._shared import HoldsNodes, kept_by_first
 
-from ..algebra import spatial
 from ..bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES, WORLD, Body, MechanismError, checked, quantities
 from ..bodies.composed_joints import parts_of
 from ..forces.contact import CONTACT_QUANTITIES, Contact
 from ..forces.joint_force import AnyForce, JointForce
 from ..loops import Loop
 from ..parameters import Quantities, bound, entries, evaluated, names_in
-from ..sweeps.links import Link, LinkState, axes_of, link
-from ..sweeps.outward import Motion, energy, propagate_motion
 
 
-class Moved(NamedTuple):
-    """The motions of a body's parent and of the body, and its partial Lagrangian."""
-
-    parent: Motion
-    motion: Motion
-    partial: Node
-
-
-class SharedParts:
-    """Bodies checked, their links, motions and energies. Bodies are not to be altered."""
-
-    def __init__(self) -> None:
-        self._bodies: WeakKeyDictionary[Body, tuple[Body, ...]] = WeakKeyDictionary()
-        self._links: WeakKeyDictionary[Body, tuple[Body | None, Link]] = WeakKeyDictionary()  # with the parent
-        self._grounds: dict[tuple[object, ...], Motion] = {}
-        self._moved: dict[tuple[object, ...], Moved] = {}
-
-    def __reduce__(self) -> tuple[type[SharedParts], tuple[()]]:
-        return SharedParts, ()  # a copy in another process computes its own
-
-    def parts(self, body: Body) -> tuple[Body, ...]:
-        """The bodies that a body is, one but for a composed joint, checked; the last is itself."""
-        known = self._bodies.get(body) if isinstance(body, Body) else None
-        if known is None:
-            known = tuple([checked(part) for part in parts_of(body)])
-            self._bodies[body] = known
-        return known
-
-    def link(self, body: Body, parent: Body | None) -> Link:
-        """The link of a checked body."""
-        known = self._links.get(body)
-        if known is None or known[0] is not parent:
-            with cg.tag(body.name):
-                known = self._links[body] = parent, link(body, axes_of(parent) if parent else np.eye(3))
-        return known[1]
-
-    def ground(self, rest: Motion) -> Motion:
-        """The world at rest, the same object for equal motions."""
-        return self._grounds.setdefault((rest.strength, *[spatial.plain(each) for each in rest.vertical]), rest)
-
-    def moved(self, parent: Motion, at: LinkState) -> Moved:
-        """The motion and energy of a link whose parent moves so. `parent` is one of these motions, or the ground's."""
-        known = [node.name for node in (*at.q, *at.u)]
-        key = (id(parent), at.name, at.joint, at.link.angle, *known, *at.link.numbers)
-        if key not in self._moved:
-            with cg.tag(at.name):
-                motion = propagate_motion(parent, at)
-                self._moved[key] = Moved(parent, motion, energy(motion, at))
-        return self._moved[key]
+@kept_by_first
+def checked_parts(body: Body) -> tuple[Body, ...]:
+    """The bodies that a body is, one but for a composed joint, checked; the last is itself."""
+    return tuple([checked(part) for part in parts_of(body)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +86,6 @@ class Structure(HoldsNodes):
     base_parameters: bool = False
     left_out: tuple[str, ...] = ()
     loops: Sequence[Loop] = ()
-    shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)
 
     @property
     def parameter_values(self) -> dict[str, float]:

@@ -19,9 +19,18 @@ from ..bodies.body import Body, quantities
 from ..joints import JointType
 from ..sweeps.base_parameters import base_parameter_links, without_axial_moments
 from ..sweeps.equation_links import equation_links
-from ..sweeps.links import Link, LinkState, link_states, parents_of
+from ..sweeps.links import Link, LinkState, link, link_states, parents_of
 from ..sweeps.mass_matrix import PlacedLink, mass_matrix_columns, size_of
-from ..sweeps.outward import Acceleration, Motion, base_acceleration, ground, propagate_acceleration, wrench
+from ..sweeps.outward import (
+    Acceleration,
+    Motion,
+    base_acceleration,
+    energy,
+    ground,
+    motions,
+    propagate_acceleration,
+    wrench,
+)
 from ..sweeps.subtree_momentum import (
     COMPOSITE,
     SubtreeMomentum,
@@ -30,7 +39,7 @@ from ..sweeps.subtree_momentum import (
     momentum_rates,
     with_known_momenta,
 )
-from .structure import Moved, Structure
+from .structure import Structure
 
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
 UNEVEN = 200.0  # times a body's moments of inertia, at most, for base numbers that are not looked at further
@@ -40,8 +49,7 @@ class TreeEquations:
     """Nodes of the motion of bodies, parents first, under a structure's gravity."""
 
     def __init__(self, structure: Structure, bodies: Sequence[Body]) -> None:
-        self.bodies, self.shared = bodies, structure.shared
-        self.base_parameters = structure.base_parameters
+        self.bodies, self.base_parameters = bodies, structure.base_parameters
         self.gravity = quantities("gravity", structure.gravity)
 
     @cached_property
@@ -64,7 +72,7 @@ class TreeEquations:
         inner = [link for link, parent in zip(self.links, self.parents, strict=True) if parent >= 0]
         axial = all([joint.has_axis for joint in self._types])
         in_plane = axial and all([link.parallel for link in inner])
-        return self.shared.ground(ground(self.gravity, in_plane=in_plane))
+        return ground(self.gravity, in_plane=in_plane)
 
     @cached_property
     def _turning(self) -> bool:
@@ -74,7 +82,7 @@ class TreeEquations:
     @cached_property
     def _own(self) -> list[Link]:
         carriers = [self.bodies[i] if i >= 0 else None for i in self.parents]
-        return [self.shared.link(body, carrier) for body, carrier in zip(self.bodies, carriers, strict=True)]
+        return [link(body, carrier) for body, carrier in zip(self.bodies, carriers, strict=True)]
 
     @cached_property
     def _placed(self) -> list[Link]:
@@ -128,7 +136,7 @@ class TreeEquations:
     def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         """Lagrangian of each body, tagged with its name and energy."""
         with building(Builder()):
-            partials = [each.partial for each in self._moved(q, qd)]
+            partials = self._partials(self.states(q, qd, self._links[0]))
             if self.base_parameters:
                 with cg.tag("potential"):
                     moment = spatial.scaled(self.ground.strength, spatial.constant(self._links[1]))
@@ -138,7 +146,14 @@ class TreeEquations:
     def regrouped_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         """Lagrangians of base numbers: their sum lacks only terms that no derivative shows."""
         with building(Builder()):
-            return [each.partial for each in self._moved(q, qd, self._fewest)]
+            return self._partials(self.states(q, qd, self._fewest))
+
+    def _partials(self, states: Sequence[LinkState]) -> list[Node]:
+        partials = []
+        for motion, at in zip(self._motions(states), states, strict=False):
+            with cg.tag(at.name):
+                partials.append(energy(motion, at))
+        return partials
 
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> list[BiasForce]:
         """The wrenches of all bodies at these accelerations, with the velocities that they work on."""
@@ -146,11 +161,12 @@ class TreeEquations:
         with building(Builder()):
             base = base_acceleration(self.ground)
             states = self.states(q, qd, self._fewest, qdd)
-            for at, moved in zip(states, self._moved(q, qd), strict=True):
+            found = self._motions(states)
+            for at, motion in zip(states, found, strict=False):
                 with cg.tag(at.name):
                     parent = accelerations[at.parent] if at.parent >= 0 else base
-                    accelerations.append(propagate_acceleration(parent, moved.parent, moved.motion, at))
-                    forces += wrench(accelerations[-1], moved.motion, at)
+                    accelerations.append(propagate_acceleration(parent, found[at.parent], motion, at))
+                    forces += wrench(accelerations[-1], motion, at)
         return forces
 
     def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
@@ -158,12 +174,9 @@ class TreeEquations:
         links = self._regrouped(equation_links(self._own, self._types, self.parents, outwards=True))[0]
         with building(build):
             links = without_axial_moments(links if self._numeric else self._fewest, self._types, self.parents)
-            planes = [moved.motion.plane for moved in self._moved(q, qd, links)]
             states = self.states(q, qd, links)
-            carried = [
-                PlacedLink(at, plane, planes[at.parent] if at.parent >= 0 else None)
-                for at, plane in zip(states, planes, strict=True)
-            ]
+            planes = [motion.plane for motion in self._motions(states)]
+            carried = [PlacedLink(at, plane, planes[at.parent]) for at, plane in zip(states, planes, strict=False)]
             columns = mass_matrix_columns(carried, len(qd))
         if self._hinged_chain:
             return columns
@@ -178,19 +191,20 @@ class TreeEquations:
         if not self._turning:
             return None
         with building(Builder()):
-            states, all_moved = self.states(q, qd, self._fewest), self._moved(q, qd)
+            states = self.states(q, qd, self._fewest)
+            found = self._motions(states)
             composites: list[SubtreeMomentum] = []
-            for at, moved in zip(states, all_moved, strict=True):
+            for at, motion in zip(states, found, strict=False):
                 with cg.tag(at.name, COMPOSITE):
-                    composites.append(body_momentum(moved.motion, at.link))
+                    composites.append(body_momentum(motion, at.link))
             rates = list[Node]()
             for i, at in reversed(list(enumerate(states))):
-                motions, own = all_moved[i][:2], p[at.first : at.first + len(at.u)]
+                own = p[at.first : at.first + len(at.u)]
                 with cg.tag(at.name, COMPOSITE):
                     composites[i] = with_known_momenta(composites[i], at, own)
-                    rates[:0] = momentum_rates(composites[i], *motions, at, own)
+                    rates[:0] = momentum_rates(composites[i], found[at.parent], found[i], at, own)
                     if at.parent >= 0:
-                        carried = about_parent(composites[i], *motions, at)
+                        carried = about_parent(composites[i], found[at.parent], found[i], at)
                         composites[at.parent] = composites[at.parent].plus(carried)
         return rates
 
@@ -205,12 +219,9 @@ class TreeEquations:
             q, u, u_dot = state
             return torque_derivatives(self.states(q, u, self._links[0], u_dot), up, build)
 
-    def _moved(self, q: Sequence[Node], qd: Sequence[Node], links: Sequence[Link] | None = None) -> list[Moved]:
-        result: list[Moved] = []
-        for at in self.states(q, qd, links or self._links[0]):
-            parent = result[at.parent].motion if at.parent >= 0 else self.ground
-            result.append(self.shared.moved(parent, at))
-        return result
+    def _motions(self, states: Sequence[LinkState]) -> list[Motion]:
+        """The motions of the links, and that of the world last, so that -1 is its place."""
+        return [*motions(states, self.ground), self.ground]
 
 
 def _size(link: Link) -> float:

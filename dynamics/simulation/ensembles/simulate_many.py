@@ -19,6 +19,7 @@ from cgraph._shared import Array, require_path, require_whole
 from ...equations.state_equation import FORMS
 from ...equations.states.initial_value import initial_values
 from ...integrators import derive, in_form
+from ...integrators.switches import switched
 from ...systems.model import Model
 from ..applied_force import SampledController, with_applied
 from ..events.event import Event, as_events, event_program
@@ -26,7 +27,6 @@ from ..outcome import Progress, split_crossings, unreached_momenta
 from ..run_options import METHOD, Options, Span, Steps, known_options, require_room, time_span
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
-from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
 from .ensemble import Ensemble, Part, doubts
 from .store import Store, sweep_of
@@ -142,14 +142,14 @@ def simulate_many(
         require_room(8 * count * start.x.size, what, "record fewer times (t_eval), simulate fewer or name a store")
 
     # Derive the equations as graphs, and write the steps of the method over them
-    begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
-    program = step_program(problem, steps.integrator, dense=bool(watched) or span.has_inner_times)
+    begin, problem = time.perf_counter(), switched(in_form(derive(applied.model, start.bound), form))
     watch, nq = event_program(problem, watched), problem.nq
 
     # Integrate, by whoever takes the chunks and compiles the steps
     span = replace(span, t_eval=steps.row_times(span)) if watched else span
-    task = Task(program, steps, span, len(start.x), watch if watched else None)
-    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
+    dense = bool(watched) or span.has_inner_times
+    task = Task(problem, steps, span, len(start.x), watch if watched else None, dense=dense)
+    p = np.array([start.varied[name] for name in problem.given]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
     width, shape = task.width(chunk, team, stored=folder is not None), (len(x), task.count, x.shape[1])
     if folder is None:

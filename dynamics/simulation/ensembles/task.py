@@ -19,16 +19,18 @@ from cgraph import Graph
 from cgraph._shared import Array, LaneCode, kept_by_first, thread_count
 from cgraph.extend import Call, FixedPoint, While, runner
 
+from ...integrators import Problem
 from ...integrators.step_control import DONE
 from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates, phases, runs_beside
 from ..events.event import EventProgram
+from ..events.modes import Modes
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import Span, Steps
 from ..stepper import BLOCK_TIME, HELD, ChosenStepper, Stepper, StoppedError, first_registers, span_registers, stepper
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import EqualSteps, Numbers, even_steps, instants_of
 from ..steps.state_sizes import Flags
-from ..steps.step_program import StepProgram, compile_steps
+from ..steps.step_program import StepProgram, compile_steps, step_program
 from .ensemble import COLUMNS, Part
 
 LARGEST_CHUNK = 256  # trajectories in a chunk one by one or of a store, unless asked for
@@ -188,9 +190,19 @@ class Task:
     """The function that runs chunks. It goes to other processes as it is, and is compiled there once."""
 
     def __init__(
-        self, program: StepProgram, options: Steps, span: Span, many: int, events: EventProgram | None = None
+        self,
+        problem: Problem,
+        options: Steps,
+        span: Span,
+        many: int,
+        events: EventProgram | None = None,
+        *,
+        dense: bool,
     ) -> None:
-        self.program, self.options, self.span, self.events, self._many = program, options, span, events, many
+        self._switched = None if problem.switches is None else problem.portable
+        dense = dense or problem.switches is not None
+        program = self.program = step_program(problem, options.integrator, dense=dense)
+        self.options, self.span, self.events, self._many = options, span, events, many
         self.times = options.row_times(span)
         self.count = len(self.times)  # rows of a trajectory
         self.largest = 0  # trajectories in a chunk at most, if they go in lanes
@@ -201,7 +213,7 @@ class Task:
             first = 0 if span.times is None else int(span.times[0] != span.t0)
             self._at_rows = np.arange(self.count) if span.times is None else numbers[first : first + self.count]
             self._steps = int(numbers[-1])
-        if events is None and fits_lanes(program, options, self._steps, many):
+        if events is None and self._switched is None and fits_lanes(program, options, self._steps, many):
             rows = self.count
             if options.estimated:
                 self._beside = runs_beside(self._grids, program.order)
@@ -279,9 +291,12 @@ class Task:
                 compiled = compile_steps(self.program, self.options.backend, self.options.fma)
             x, p = chunk.x[k], chunk.p[k].tolist()
             if run is None or self.events is not None:
-                run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
+                modes = None if self._switched is None else Modes(self._switched)
+                run = stepper(compiled, self.options, p, stopped=stopped, events=self.events, modes=modes)
             run.set_parameters(p)
-            if has_end and isinstance(run, ChosenStepper) and run.log is None:  # steps need not be looked at
+            if (
+                has_end and isinstance(run, ChosenStepper) and run.log is run.modes
+            ):  # both None: steps need not be looked at
                 if run.unseen(x, self.span):
                     part.reached(k, steps=run.steps, rejected=run.rejected, nfev=run.evaluations, dt=run.largest)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x

@@ -8,7 +8,7 @@ it, or it is halved.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -20,16 +20,15 @@ from cgraph import Graph
 from cgraph._shared import Array, kept_by_first, memo
 from cgraph.extend import enclosure
 
+from ...integrators.problem import reaches
 from ..steps.dense_output import UNIT, Indices, StepBlock
-from ..steps.row_values import values_of
 
 MOST_CELLS = 4096  # that wait at once
 SHORTEST = 2.0**-50  # of a step, a cell
 LEFT = 1e-3  # of the largest that a quantity is in a step, by which it has left zero
-PARTS = 32  # into which a cell is divided again and again to find a root
-BITS = 56.0  # of where in a cell
+PARTS = 32  # of the first step, at whose ends a quantity that begins at zero is looked at
 DEGREES = 8  # of dense output, whose matrices are kept
-MANY_NODES = 150  # of a graph that is compiled
+OFTEN = 200  # calls of a graph, which take about as long as to compile it
 
 
 class Crossing(NamedTuple):
@@ -53,14 +52,25 @@ class Quantities:
         return cg.simplify(cg.jvp(self.values, list(self.values.input_names[: self.size + 1])))
 
     @cached_property
-    def bounds(self) -> Graph:
-        """Lower and upper bounds of the values: inputs the parameters, then lows and highs of states and t."""
-        return enclosure(self.values, exact=self._parameters)
+    def affine(self) -> tuple[bool, ...]:
+        """Whether each is a sum of states and t times what is constant, whose bounds are those of control points."""
+        moving = self.slopes.inputs[: self.size + 1]
+        return tuple([not reaches([slope], moving) for slope in self.slopes.outputs.values()])
+
+    @cached_property
+    def curved(self) -> Graph:
+        """Bounds of those that are not affine: inputs the parameters, then lows and highs of states and t."""
+        outputs = [each for each, affine in zip(self.values.outputs.items(), self.affine, strict=True) if not affine]
+        return enclosure(Graph(self.values.inputs, dict(outputs)), exact=self._parameters)
 
     @cached_property
     def slope_bounds(self) -> Graph:
         """The same of the slopes."""
         return enclosure(self.slopes, exact=self._parameters)
+
+    def part(self, number: int) -> Quantities:
+        """One of them."""
+        return _part(self, number)
 
     @property
     def _parameters(self) -> list[str]:
@@ -74,41 +84,72 @@ def quantities(graph: Graph, m: int) -> Quantities:
 
 
 @kept_by_first
-def _function(graph: Graph) -> Callable[[Array], Array]:
-    """The outputs (k, N) at points (inputs, N)."""
-    if len(graph.nodes) > MANY_NODES:
-        return cg.compile(graph).batch
-    return lambda points: values_of(graph, [*points], points.shape[1])
+def _part(watched: Quantities, number: int) -> Quantities:
+    name, node = list(watched.values.outputs.items())[number]
+    return Quantities(Graph(watched.values.inputs, {name: node}), watched.size)
+
+
+class _Batch:
+    """The outputs (k, N) of a graph at points (inputs, N), operation by operation; often asked, by machine code."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph, self._calls = graph, 0
+        self._function: Callable[[Array], Array] | None = None
+
+    def __call__(self, points: Array) -> Array:
+        """The outputs."""
+        self._calls += 1
+        if self._calls == OFTEN:
+            self._function = cg.compile(self._graph).batch
+        if self._function is not None:
+            return self._function(points)
+        result = np.empty((len(self._graph.outputs), points.shape[1]))
+        for row, value in zip(result, _operations(self._graph, numbers=False)(points), strict=True):
+            row[:] = value
+        return result
+
+
+_batch = kept_by_first(_Batch)
+
+
+@kept_by_first
+def _operations(graph: Graph, *, numbers: bool) -> Callable[[Iterable[Any]], list[Any]]:
+    """The outputs at numbers, or at arrays, operation by operation."""
+    leaves = [*graph.inputs, *[node for node in graph.nodes if node.value is not None]]
+    made = [node for node in graph.nodes if node.args]
+    place = {node: k for k, node in enumerate([*leaves, *made])}
+    constants = [node.value for node in leaves[len(graph.inputs) :]]
+    functions = [node.op.scalar if numbers else node.op.array for node in made]
+    slots, wanted = (
+        [[place[arg] for arg in node.args] for node in made],
+        [place[node] for node in graph.outputs.values()],
+    )
+
+    def values(inputs: Iterable[Any]) -> list[Any]:
+        known = [*inputs, *constants]
+        for function, arguments in zip(functions, slots, strict=True):
+            known.append(function(*[known[slot] for slot in arguments]))
+        return [known[slot] for slot in wanted]
+
+    return values
 
 
 def outputs_of(graph: Graph, *parts: Any) -> Array:
     """Outputs (k, N) of a graph at inputs that go along the last axis, or are the same at all points."""
-    width = max([np.shape(part)[-1] for part in parts if np.ndim(part) == 2])
-    rows = [
-        np.broadcast_to(np.reshape(part, (-1, 1)) if np.ndim(part) < 2 else part, (len(part), width)) for part in parts
-    ]
+    points = np.empty((len(graph.inputs), max([part.shape[-1] for part in parts if np.ndim(part) == 2])))
+    first = 0
+    for part in parts:
+        points[first : first + len(part)] = part if np.ndim(part) == 2 else np.reshape(part, (-1, 1))
+        first += len(part)
     with np.errstate(all="ignore"):
-        return np.asarray(_function(graph)(np.concatenate(rows)))
-
-
-class Cells(NamedTuple):
-    """Parts of steps, from share a to share b, and the quantity that each is of, (n,) each."""
-
-    rows: Indices
-    a: Array
-    b: Array
-    number: Indices
-
-    def take(self, which: Any) -> Cells:
-        """Subset of the cells."""
-        return Cells._make([array[which] for array in self])
+        return _batch(graph)(points)
 
 
 def steps_near_zero(watched: Quantities, p: Array, block: StepBlock) -> list[int]:
     """Steps in which quantities may not be positive."""
     rows = np.arange(len(block.t))
-    bounds = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))
-    return list(np.flatnonzero(~(bounds[: len(bounds) // 2] > 0.0).all(axis=0)).tolist())
+    low, _ = _bounds(watched, p, block, rows, np.zeros(len(rows)), np.ones(len(rows)))
+    return list(np.flatnonzero(~(low >= 0.0).all(axis=0)).tolist())
 
 
 def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> tuple[Crossing | None, bool]:
@@ -117,82 +158,134 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
     fresh: (k,), of a quantity that begins at zero how far it is rounding; it counts as positive until it has left that
     in the first step; NaN of the others.
     """
-    rows = np.arange(len(block.t))
-    low = outputs_of(watched.bounds, p, *_hulls(block, rows, np.zeros(len(rows)), np.ones(len(rows))))[: len(fresh)]
-    which, number = np.nonzero(~(low > 0.0).T)
-    begins = np.where(which == 0, _left_at(watched, p, block, fresh)[number], 0.0)
-    cells = Cells(which, begins, np.ones(len(which)), number).take(begins < 1.0)
-    best: Crossing | None = None
-    while len(cells.rows):
-        own = (cells.number, np.arange(len(cells.rows)))
-        k = len(fresh)
-        boxes = outputs_of(watched.bounds, p, *_hulls(block, cells.rows, cells.a, cells.b))
-        tangents = _tangents(block, cells)
-        slopes = outputs_of(watched.slope_bounds, p, *tangents)
-        rises, falls = slopes[:k][own] >= 0.0, slopes[k:][own] <= 0.0
-        before, after = [_values(watched, p, block, cells.rows, s)[own] for s in (cells.a, cells.b)]
-        clear = boxes[:k][own] > 0.0
-        single = (rises | falls) & np.isfinite(boxes[k:][own] - boxes[:k][own])  # a pole is no zero
-        last = cells.b - cells.a <= SHORTEST
-        passes = ~clear & (single | last) & ((after < 0.0) | (before < 0.0))
-        for each in np.flatnonzero(passes):
-            at = (int(cells.rows[each]), float(cells.a[each]))
-            if best is not None and at >= best[:2]:
-                continue
-            n = int(cells.number[each])
-            s = at[1] if before[each] < 0.0 else _root(watched, p, block, *at, float(cells.b[each]), n)
-            if best is None or (at[0], s) < best[:2]:
-                best = Crossing(at[0], s, n)
-        split = ~(clear | single | last)
+    rows, best, is_sure = np.arange(len(block.t)), None, True
+    low, _ = _bounds(watched, p, block, rows, np.zeros(len(rows)), np.ones(len(rows)))
+    doubtful, number = np.nonzero(~(low >= 0.0).T)
+    for n in dict.fromkeys(number.tolist()):
+        where = doubtful[number == n]
+        a = np.where(where == 0, _left_at(watched.part(n), p, block, fresh[n]), 0.0)
+        found, sure = _first_zero(watched.part(n), p, block, where[a < 1.0], a[a < 1.0], best)
+        best, is_sure = best if found is None else Crossing(*found, n), is_sure and sure
+    return best, is_sure
+
+
+def _first_zero(
+    one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, before: Crossing | None
+) -> tuple[tuple[int, float] | None, bool]:
+    """Step and share of it where one quantity first falls below zero, from share a (n,) of each of some steps on.
+
+    before: another crossing, after which nothing counts.
+    """
+    best, b = None if before is None else before[:2], np.ones(len(rows))
+    found: tuple[int, float] | None = None
+    while len(rows):
+        begins, ends = np.split(_values(one, p, block, np.tile(rows, 2), np.concatenate([a, b]))[0], 2)
+        clear, goes_one_way = told_by_slopes(one, p, block, Cells(rows, a, b), begins, ends)
+        told = clear | goes_one_way | (b - a <= SHORTEST)
+        passes = np.flatnonzero(told & ~clear & ((begins < 0.0) | (ends < 0.0)))
+        for k in passes[np.lexsort((a[passes], rows[passes]))].tolist():
+            row, at = int(rows[k]), float(a[k])
+            if best is not None and (row, at) >= best:
+                break
+            place = row, at if begins[k] < 0.0 else _root(one, p, block, row, at, float(b[k]))
+            if best is None or place < best:
+                best = found = place
+        split = ~told
         if best is not None:
-            split &= (cells.rows < best.row) | ((cells.rows == best.row) & (cells.a < best.s))
-        cells = cells.take(split)
-        middle = 0.5 * (cells.a + cells.b)
-        halves = cells._replace(b=middle), cells._replace(a=middle)
-        cells = Cells._make([np.concatenate(pair) for pair in zip(*halves, strict=True)])
-        if len(cells.rows) > MOST_CELLS:
-            return best, False
-    return best, True
+            split &= (rows < best[0]) | ((rows == best[0]) & (a < best[1]))
+        rows, a, b = rows[split], a[split], b[split]
+        middle = 0.5 * (a + b)
+        rows, a, b = np.tile(rows, 2), np.concatenate([a, middle]), np.concatenate([middle, b])
+        if len(rows) > MOST_CELLS:
+            return found, False
+    return found, True
+
+
+class Cells(NamedTuple):
+    """Parts of steps, from share a to share b, (n,) each."""
+
+    rows: Indices
+    a: Array
+    b: Array
+
+
+def told_by_slopes(
+    one: Quantities, p: Array, block: StepBlock, cells: Cells, begins: Array, ends: Array
+) -> tuple[Array, Array]:
+    """Of one quantity, with values at both ends of cells, whether it is positive there, and whether it goes one way."""
+    down, up = _slope_bounds(one, p, block, *cells)
+    with np.errstate(all="ignore"):
+        # it lies above the lines of the least slope from the left and the largest from the right, which meet here
+        least = (begins * up - ends * down + up * down * (cells.b - cells.a)) / (up - down)
+    one_way = np.isfinite(up - down) & ((down >= 0.0) | (up <= 0.0))
+    return (np.where(one_way, np.minimum(begins, ends), least) > 0.0) & np.isfinite(up - down), one_way
 
 
 def told_by_bounds(
-    watched: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
+    one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
 ) -> tuple[Array, Array, Array]:
-    """Of one quantity and cells, (n,), whether it is clear of zero, goes one way, and is bounded."""
-    cells = Cells(rows, a, b, np.zeros_like(rows))
-    low, high = outputs_of(watched.bounds, p, *_hulls(block, rows, a, b))
-    down, up = outputs_of(watched.slope_bounds, p, *_tangents(block, cells))
+    """Of one quantity and cells, (n,), whether it is clear of zero, goes one way, and is bounded, as not at a pole."""
+    low, high = [each[0] for each in _bounds(one, p, block, rows, a, b)]
+    down, up = _slope_bounds(one, p, block, rows, a, b)
     clear = (low > 0.0) | (high < 0.0)
     is_bounded = np.isfinite(high - low)
     return clear, is_bounded & ((down >= 0.0) | (up <= 0.0)), is_bounded
 
 
-def _left_at(watched: Quantities, p: Array, block: StepBlock, fresh: Array) -> Array:
-    """The share of the first step from which each quantity is looked at, (k,); 1 where it stays on its side."""
-    begins = np.where(np.isnan(fresh), 0.0, 1.0)
-    if begins.any():
-        s = np.linspace(0.0, 1.0, PARTS + 1)
-        values = _values(watched, p, block, np.zeros(len(s), dtype=np.intp), s)
-        size = np.abs(values).max(axis=1)
-        for k in np.flatnonzero((begins > 0.0) & (size > fresh)):
-            left = np.flatnonzero(values[k] >= LEFT * size[k])
-            begins[k] = s[left[0]] if len(left) else 1.0 - UNIT if values[k, -1] < 0.0 else 1.0
-    return begins
+def _left_at(one: Quantities, p: Array, block: StepBlock, rounding: float) -> float:
+    """The share of the first step from which a quantity that begins at zero is looked at; 1 if it stays on its side."""
+    if math.isnan(rounding):
+        return 0.0
+    s = np.linspace(0.0, 1.0, PARTS + 1)
+    values = _values(one, p, block, np.zeros(len(s), dtype=np.intp), s)[0]
+    size = np.abs(values).max()
+    if not size > rounding:
+        return 1.0
+    left = np.flatnonzero(values >= LEFT * size)
+    return float(s[left[0]]) if len(left) else 1.0 - UNIT if values[-1] < 0.0 else 1.0
 
 
-def _values(watched: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:
-    return outputs_of(watched.values, block.states_at(rows, s).T, block.times_at(rows, s)[None], p)
+def _values(one: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:
+    return outputs_of(one.values, block.polynomials_at(rows, s).T, block.times_at(rows, s)[None], p)
 
 
-def _root(watched: Quantities, p: Array, block: StepBlock, row: int, low: float, high: float, number: int) -> float:
-    """The first share of a step, to the last bit, at which a quantity that falls is below zero."""
-    for _ in range(math.ceil(BITS / math.log2(PARTS))):
-        s = np.linspace(low, high, PARTS + 1)
-        below = _values(watched, p, block, np.full(len(s), row), s)[number] < 0.0
-        below[0], below[-1] = False, True
-        at = int(np.argmax(below))
-        low, high = float(s[at - 1]), float(s[at])
-    return high
+def _root(one: Quantities, p: Array, block: StepBlock, row: int, low: float, high: float) -> float:
+    """The first share of a step, but for rounding, at which a quantity that falls is below zero (Chandrupatla 1997)."""
+    assert block.dense is not None
+    powers, start = block.dense[row][::-1], block.x_old[row]
+    t, h, fixed, function = (
+        float(block.t_old[row]),
+        float(block.h[row]),
+        p.tolist(),
+        _operations(one.values, numbers=True),
+    )
+
+    def value(s: float) -> float:
+        x = np.zeros_like(start)
+        for coefficients in powers:
+            x = (x + coefficients) * s
+        return float(function([*(start + x).tolist(), t + s * h, *fixed])[0])
+
+    a, b, f_a, f_b = low, high, value(low), value(high)
+    if not f_b < 0.0:
+        return high
+    c, f_c, share = a, f_a, 0.5
+    while abs(b - a) > 2.0 * UNIT * max(abs(a), abs(b)):
+        s = a + share * (b - a)
+        f = value(s)
+        if (f < 0.0) == (f_a < 0.0):
+            c, f_c = a, f_a
+        else:
+            c, f_c, b, f_b = b, f_b, a, f_a
+        a, f_a = s, f
+        # inverse quadratic interpolation where that is safe, and no step below rounding
+        xi, phi = (a - b) / (c - b), (f_a - f_b) / (f_c - f_b) if f_c != f_b else 0.5
+        share = 0.5
+        if phi * phi < xi and (1.0 - phi) * (1.0 - phi) < 1.0 - xi and f_c != f_a and f_b != f_a:
+            share = f_a / (f_b - f_a) * f_c / (f_b - f_c) + (c - a) / (b - a) * f_a / (f_c - f_a) * f_b / (f_c - f_b)
+        least = min(0.5, UNIT * max(abs(a), abs(b)) / abs(b - a)) if b != a else 0.5
+        share = min(max(share, least), 1.0 - least)
+    return a if f_a < 0.0 else b
 
 
 @memo(DEGREES)
@@ -202,29 +295,59 @@ def _binomials(degree: int) -> tuple[Array, Array]:
     return choose, choose.T / choose[:, degree]
 
 
-def _bernstein(coefficients: Array, a: Array, b: Array) -> tuple[Array, Array]:
-    """Least and largest Bernstein coefficients (m, n) of polynomials (n, degree + 1, m) on [a, b] (n,)."""
+def _control_points(coefficients: Array, a: Array, b: Array) -> Array:
+    """Bernstein coefficients (n, degree + 1, m) of polynomials (n, degree + 1, m) on [a, b] (n,)."""
     degree = coefficients.shape[1] - 1
     choose, matrix = _binomials(degree)
     i, k = np.indices(choose.shape)
     parts = choose * a[:, None, None] ** np.maximum(k - i, 0) * (b - a)[:, None, None] ** i
-    points = matrix @ np.where(k >= i, parts, 0.0) @ coefficients
+    return np.asarray(matrix @ np.where(k >= i, parts, 0.0) @ coefficients)
+
+
+def _state_points(block: StepBlock, rows: Indices, a: Array, b: Array) -> Array:
+    """Control points of states and times on cells, (n, degree + 1, m + 1)."""
+    assert block.dense is not None
+    x = _control_points(np.concatenate([block.x_old[rows, None], block.dense[rows]], axis=1), a, b)
+    t = np.linspace(block.times_at(rows, a), block.times_at(rows, b), x.shape[1], axis=1)
+    return np.concatenate([x, t[:, :, None]], axis=2)
+
+
+def _slope_points(block: StepBlock, rows: Indices, a: Array, b: Array) -> Array:
+    """The same of their derivatives by the share of the step, (n, degree, m + 1)."""
+    assert block.dense is not None
+    powers = np.arange(1, block.dense.shape[1] + 1)[:, None]
+    slopes = _control_points(powers * block.dense[rows], a, b)
+    h = np.broadcast_to(block.h[rows, None, None], (*slopes.shape[:2], 1))
+    return np.concatenate([slopes, h], axis=2)
+
+
+def _ends(points: Array) -> tuple[Array, Array]:
+    """Least and largest of control points, (m, n)."""
     return points.min(axis=1).T, points.max(axis=1).T
 
 
-def _hulls(block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:
-    """Least and largest states and times on cells, (m + 1, n)."""
-    assert block.dense is not None
-    low, high = _bernstein(np.concatenate([block.x_old[rows, None], block.dense[rows]], axis=1), a, b)
-    ends = np.stack([block.times_at(rows, a), block.times_at(rows, b)])
-    return np.vstack([low, ends.min(axis=0)]), np.vstack([high, ends.max(axis=0)])
+def _bounds(watched: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:
+    """Lower and upper bounds of quantities on cells, (k, n)."""
+    points, affine = _state_points(block, rows, a, b), np.array(watched.affine)
+    low, high = np.empty((2, len(affine), len(rows)))
+    if affine.any():
+        at = outputs_of(watched.values, points.reshape(-1, points.shape[2]).T, p)[affine]
+        parts = at.reshape(len(at), *points.shape[:2])
+        low[affine], high[affine] = parts.min(axis=2), parts.max(axis=2)
+    if not affine.all():
+        low[~affine], high[~affine] = np.split(outputs_of(watched.curved, p, *_ends(points)), 2)
+    return low, high
 
 
-def _tangents(block: StepBlock, cells: Cells) -> tuple[Array, Array]:
-    """Least and largest states, times and their derivatives by the share of the step."""
-    assert block.dense is not None
-    low, high = _hulls(block, cells.rows, cells.a, cells.b)
-    powers = np.arange(1, block.dense.shape[1] + 1)[:, None]
-    slopes = _bernstein(powers * block.dense[cells.rows], cells.a, cells.b)
-    h = block.h[cells.rows][None]
-    return np.vstack([low, slopes[0], h]), np.vstack([high, slopes[1], h])
+def _slope_bounds(
+    one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
+) -> tuple[Array, Array]:
+    """Lower and upper bounds of the slope of one quantity by the share of the step on cells, (n,)."""
+    points, slopes = _state_points(block, rows, a, b), _slope_points(block, rows, a, b)
+    if one.affine[0]:
+        at = np.repeat(points[:, :1], slopes.shape[1], axis=1).reshape(-1, points.shape[2]).T
+        found = outputs_of(one.slopes, at, p, slopes.reshape(-1, slopes.shape[2]).T)[0].reshape(slopes.shape[:2])
+        return found.min(axis=1), found.max(axis=1)
+    (low, high), (down, up) = _ends(points), _ends(slopes)
+    least, largest = outputs_of(one.slope_bounds, p, np.vstack([low, down]), np.vstack([high, up]))
+    return least, largest

@@ -97,7 +97,7 @@ class Cells(NamedTuple):
     slope_a: Array
     slope_b: Array
     clear: Flags  # whether the quantity cannot be zero there
-    broken: Flags  # whether it has no bounds, as at a pole
+    broken: Flags  # whether it has a pole there: no bounds, or a turn of sign against both slopes
 
     def take(self, which: Flags | Indices) -> Cells:
         """Subset of the cells."""
@@ -127,7 +127,9 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
         told = clear | goes_one_way | (bounded & (size <= 2.0 * steps.rounding(fresh.rows, fresh.b)))
         nothing = np.isnan(fresh.g_a) & np.isnan(fresh.g_b)
         done[new] = told | nothing | (fresh.b - fresh.a <= SHORTEST)
-        cells.clear[new], cells.broken[new] = clear, ~bounded
+        rise = fresh.g_b - fresh.g_a
+        against = (rise * fresh.slope_a < 0.0) & (rise * fresh.slope_b < 0.0) & (fresh.g_a * fresh.g_b < 0.0)
+        cells.clear[new], cells.broken[new] = clear, ~(bounded & np.isfinite(rise)) | against
         size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[~done], minlength=count)
         late = (size > MOST_CELLS)[cells.rows] & ~done
         beyond[cells.rows[late]] = True

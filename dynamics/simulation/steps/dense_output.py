@@ -42,14 +42,14 @@ class StepBlock(NamedTuple):
 
     def states_at(self, rows: Indices, s: Array) -> Array:
         """States (k, m) at the shares s (k,) of the steps `rows` (k,)."""
-        states, graph = self._polynomial(rows, s), self.normalization
+        states, graph = self.polynomials_at(rows, s), self.normalization
         if graph is None:
             return states
         with np.errstate(all="ignore"):
             met = values_of(graph, self._inputs(graph, rows, s, states), len(s)).T
         return np.where((s == 1.0)[:, None], states, met)
 
-    def _polynomial(self, rows: Indices, s: Array) -> Array:
+    def polynomials_at(self, rows: Indices, s: Array) -> Array:
         """States (k, m), not normalized between the ends."""
         assert self.dense is not None
         total, share = np.zeros((len(rows), self.x.shape[1])), s[:, None]
@@ -87,7 +87,7 @@ class StepBlock(NamedTuple):
             total += k * coefficients
         if graph is None:
             return total
-        inputs = [*self._inputs(graph, rows, s, self._polynomial(rows, s)), *total.T]
+        inputs = [*self._inputs(graph, rows, s, self.polynomials_at(rows, s)), *total.T]
         with np.errstate(all="ignore"):
             return values_of(_tangent(graph, self.x.shape[1]), inputs, len(s)).T
 

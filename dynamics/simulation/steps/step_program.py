@@ -92,6 +92,15 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
     )
 
 
+@kept_by_first
+def slide_program(plain: StepProgram, problem: Problem, method: Method) -> StepProgram:
+    """The steps of a problem that slides on surfaces of that of other steps."""
+    steps = _normalized(method.program(problem, dense=True), problem, method)
+    if method.adaptive:
+        steps = with_first_step(steps, problem, plain.kinds, method.order, starts=method.starts)
+    return replace(plain, steps=steps, rate=problem.rate, timed=problem.timed)
+
+
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
     """The steps, which normalize or project where they arrive; `farthest` tells how far, in tolerances."""
     if problem.projection is not None and method.adaptive:

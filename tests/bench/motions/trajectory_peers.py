@@ -33,10 +33,9 @@ EPSILON = 2.0**-52
 COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
 MOST_STEPS = 100_000  # steps of heyoka and of CVODES
 MUJOCO = {"Euler": 1, "RK4": 4, "implicit": 1, "implicitfast": 1}  # with the orders of their errors
-CVODES: dict[str, dict[str, Any]] = {
-    "BDF": {},
-    "Adams": {"linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional"},
-}
+QUIET: dict[str, Any] = {"show_eval_warnings": False}
+ADAMS = QUIET | {"linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional"}
+CVODES = {"BDF": QUIET, "Adams": ADAMS}
 
 
 # How the names of peers' solvers begin.
@@ -182,13 +181,8 @@ class Cvodes(EndSolver):
         self.equations = casadi_equations(self.casadi, problem)
 
     def _function(self, knob: float, times: Sequence[float]) -> Function:
-        options = {
-            "reltol": knob,
-            "abstol": self.absolute(knob),
-            "max_num_steps": MOST_STEPS,
-            "show_eval_warnings": False,
-        }
-        return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
+        options = {"reltol": knob, "abstol": self.absolute(knob), "max_num_steps": MOST_STEPS} | self.options
+        return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options)
 
     def ready(self, knob: float) -> Run:
         function = self._function(knob, [self.task.t_end])

@@ -47,48 +47,22 @@ class Kind:
 
 
 # In the order of the tables' columns; modules and packages are imported when a peer is made.
+# fmt: off
 PEERS = {
-    "ours": Kind(
-        "our graph as machine code through LLVM",
-        "cgraph",
-        ALL | {("inertial-gradient", "call")},
-        "ours.Ours",
-    ),
-    "ours-numpy": Kind(
-        "our graph as generated NumPy, for where there is no llvmlite",
-        "numpy",
-        {(task, "batch") for task in TASKS if task not in MOTIONS},
-        "ours.OurNumpy",
-    ),
-    "ours-gcc": Kind(
-        "our graph, written as C code by CasADi and through the C compiler: another code generator, the same graph",
-        "casadi",
-        GRAPHS,
-        "casadi.CasadiPeer",
-        {"native": True, "own_graph": False},
-    ),
-    "casadi-gcc": Kind(
-        "CasADi's own graph as C code, through the C compiler",
-        "casadi",
-        ALL,
-        "casadi.CasadiPeer",
-        {"native": True},
-    ),
+    "ours": Kind("our graph as machine code through LLVM", "cgraph", ALL | {("inertial-gradient", "call")},
+                 "ours.Ours"),
+    "ours-numpy": Kind("our graph as generated NumPy, for where there is no llvmlite", "numpy",
+                       {(task, "batch") for task in TASKS if task not in MOTIONS}, "ours.OurNumpy"),
+    "ours-gcc": Kind("our graph, written as C code by CasADi and through the C compiler: another code generator, the "
+                     "same graph", "casadi", GRAPHS, "casadi.CasadiPeer", {"native": True, "own_graph": False}),
+    "casadi-gcc": Kind("CasADi's own graph as C code, through the C compiler", "casadi", ALL, "casadi.CasadiPeer",
+                       {"native": True}),
     "casadi": Kind("CasADi's own graph in its virtual machine", "casadi", ALL, "casadi.CasadiPeer"),
-    "pinocchio": Kind(
-        "Pinocchio's rnea and aba and their derivatives, C++; the step of RK4 is written in Python",
-        "pinocchio",
-        CALLS | SLOPES | {("rk4", "call")},
-        "pinocchio.PinocchioPeer",
-    ),
-    "mujoco": Kind(
-        "MuJoCo's mj_inverse and mj_forward, mj_step and rollout for RK4; contacts off",
-        "mujoco",
-        RK4 | {("inverse", "call"), ("forward", "call")},
-        "mujoco.MujocoPeer",
-    ),
+    "pinocchio": Kind("Pinocchio's rnea and aba and their derivatives, C++; the step of RK4 is written in Python",
+                      "pinocchio", CALLS | SLOPES | {("rk4", "call")}, "pinocchio.PinocchioPeer"),
+    "mujoco": Kind("MuJoCo's mj_inverse and mj_forward, mj_step and rollout for RK4; contacts off", "mujoco",
+                   RK4 | {("inverse", "call"), ("forward", "call")}, "mujoco.MujocoPeer"),
     "heyoka": Kind("heyoka's own expressions through LLVM", "heyoka", CALLS, "heyoka.HeyokaPeer"),
     "jax": Kind("JAX on the CPU, jitted, double precision", "jax", ALL, "jax.JaxPeer"),
-    "sympy": Kind("SymPy through lambdify with cse, and numpy.linalg.solve", "sympy", CALLS, "sympy.SympyPeer"),
-    "torch": Kind("PyTorch eager, torch.autograd", "torch", {("inverse", "call")}, "torch.TorchPeer"),
 }
+# fmt: on

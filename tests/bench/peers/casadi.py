@@ -14,21 +14,11 @@ import numpy as np
 
 from cgraph import Graph, GraphError, to_casadi
 from cgraph._shared import Array, kept_by_first
-from tests.bench.peers.peer import (
-    BATCH,
-    DERIVATIVES,
-    MOTIONS,
-    NUDGE,
-    PASSES,
-    Peer,
-    PeerModel,
-    TimedTask,
-    UnavailableError,
-    required,
-    rk4_step,
-)
-from tests.bench.peers.task_graphs import rate_graph, task_graph
-from tests.bench.peers.translate import lagrangian, quasi_velocities
+from dynamics.verification.residual import UnavailableError
+
+from .peer import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Peer, PeerModel, TimedTask, required, rk4_step
+from .task_graphs import rate_graph, task_graph
+from .translate import lagrangian, quasi_velocities
 
 if TYPE_CHECKING:
     from casadi import Function

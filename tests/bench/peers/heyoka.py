@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cgraph.autodiff.ldl_solve import ldl_elimination
-from tests.bench.peers.peer import Peer, PeerModel, TimedTask, required
-from tests.bench.peers.translate import lagrange, lagrangian, require_rates
+from tests.bench.peers.peer import Peer, PeerModel, TimedTask, UnavailableError, required
+from tests.bench.peers.translate import lagrangian
 
 if TYPE_CHECKING:
     from heyoka import expression
@@ -23,7 +23,8 @@ class HeyokaPeer(Peer):
 
     def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
-        require_rates(case)
+        if case.system.kinematics.quasi is not None:
+            raise UnavailableError("is measured on velocities that are rates of coordinates")
         self.heyoka = heyoka()
         leave_cache(self.heyoka)
         self.functions: dict[str, Callable[..., object]] = {}
@@ -56,7 +57,9 @@ def expressions(case: PeerModel, task: str) -> tuple[list[expression], list[expr
     energy, forces = lagrangian(case, q, qd, hy, number=hy.expression)
     slopes = list(hy.diff_tensors([energy], diff_args=[*q, *qd], diff_order=1).gradient)
     hessian = hy.diff_tensors(slopes[n:], diff_args=[*q, *qd], diff_order=1).jacobian
-    mass, rest = lagrange(case, qd, slopes, hessian, forces, hy.sum)
+    mass = [[hessian[i, n + k] for k in range(n)] for i in range(n)]
+    known = [slopes[i] + forces[i] - case.system.damping[i] * qd[i] for i in range(n)]
+    rest = [hy.sum([hessian[i, k] * qd[k] for k in range(n)]) - known[i] for i in range(n)]
     if task == "forward":
         return ldl_elimination(mass, [a - b for a, b in zip(last, rest, strict=True)])[0], inputs
     inertia = [hy.sum([m * a for m, a in zip(row, last, strict=True)]) for row in mass]

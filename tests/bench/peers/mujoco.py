@@ -9,8 +9,9 @@ import numpy as np
 
 from cgraph._shared import Array
 from dynamics.io.mujoco_module import mujoco
-from dynamics.io.mujoco_twin import MujocoTwin, joint_order
+from dynamics.io.mujoco_twin import joint_order
 from tests.bench.peers.peer import DT, PASSES, Peer, PeerModel, TimedTask, UnavailableError
+from tests.mujoco_twin import AskedTwin
 
 
 class MujocoPeer(Peer):
@@ -19,7 +20,7 @@ class MujocoPeer(Peer):
     def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
         mechanism = case.bodies
-        self.twin = MujocoTwin(mechanism, timestep=DT)
+        self.twin = AskedTwin(mechanism, timestep=DT)
         self.mujoco, model = self.twin.mujoco, self.twin.model
         for unused in ("CONSTRAINT", "SENSOR", "ACTUATION", "WARMSTART"):
             model.opt.disableflags |= getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{unused}")

@@ -41,7 +41,7 @@ class PinocchioPeer(Peer):
 
     def prepare(self, task: str, mode: str) -> TimedTask:
         if self.loops and DERIVATIVES.get(task, task) != "inverse":
-            raise UnavailableError("has no loops in aba; the bench's closed-chains have its constraintDynamics")
+            raise UnavailableError("has no loops in aba")
         if task == "rk4":
             return self._step()
         if task in DERIVATIVES:

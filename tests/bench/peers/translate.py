@@ -53,25 +53,6 @@ def lagrangian(
     return values[system.lagrangian], [values[force] for force in system.forces]
 
 
-def lagrange(
-    case: PeerModel,
-    qd: Sequence[Any],
-    slopes: Sequence[Any],
-    hessian: Mapping[tuple[int, int], Any],
-    forces: Sequence[Any],
-    total: Callable[[list[Any]], Any],
-) -> tuple[list[list[Any]], list[Any]]:
-    """M and the rest of Lagrange's equation, tau = M qdd + rest, of a peer's own derivatives of L.
-
-    slopes: dL/d(q, qd).  hessian: [i, k] is the derivative of dL/dqd_i by the k-th of (q, qd).
-    """
-    n, damping = case.n, case.system.damping
-    known = [slopes[i] + forces[i] - damping[i] * qd[i] for i in range(n)]
-    moved = [total([hessian[i, k] * qd[k] for k in range(n)]) for i in range(n)]
-    mass = [[hessian[i, n + k] for k in range(n)] for i in range(n)]
-    return mass, [one - other for one, other in zip(moved, known, strict=True)]
-
-
 def quasi_velocities(
     case: PeerModel,
     q: Sequence[Expression],
@@ -88,9 +69,3 @@ def quasi_velocities(
     env = dict(zip([*case.system.q, *case.system.qd, *p], [*q, *qd, *momenta], strict=True))
     values = translated(topological([*kinematics.q_dot, *taken]), env, functions, names, number)
     return [values[rate] for rate in kinematics.q_dot], [values[term] for term in taken]
-
-
-def require_rates(case: PeerModel) -> None:
-    """Raises UnavailableError for a model with quasi-velocities: for peers whose derivation knows none."""
-    if case.system.kinematics.quasi is not None:
-        raise UnavailableError("is measured on velocities that are rates of coordinates")

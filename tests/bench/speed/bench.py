@@ -192,9 +192,6 @@ class WorkerPool:
             worker.end()
 
 
-HOW = f"{install('bench')}; PyTorch by itself"  # to install what is missing
-
-
 def tables(rows: Sequence[Row], where: str = "") -> str:
     """All tables of these rows, with what the columns and marks mean.  where: the machine, in words."""
     shown = [peer for peer in PEERS if any(peer in row.cells or peer in row.skipped for row in rows)]
@@ -205,7 +202,7 @@ def tables(rows: Sequence[Row], where: str = "") -> str:
         f"* the fastest of its row.  ! it differs from ours by more than {AGREES:g}.  - a: not measured, see below.",
         "",
         *[f"{peer:<11} {PEERS[peer].about}" for peer in shown],
-        *(textwrap.wrap(f"not installed: {', '.join(missing)} ({HOW})", WIDTH) if missing else []),
+        *(textwrap.wrap(f"not installed: {', '.join(missing)} ({install('bench')})", WIDTH) if missing else []),
     ]
     for task, about in TASKS.items():
         of_task = [row for row in rows if row.task == task]

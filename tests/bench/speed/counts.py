@@ -34,11 +34,7 @@ LARGEST_COUNTED = 200  # coordinates
 CHAINS: dict[str, Callable[[int], Mechanism]] = {
     f"planar {n}": lambda n: chain(0.9, 0.7, n) for n in (3, 10, 20, 50, 100, LARGEST_COUNTED)
 }
-COUNTED: dict[str, Callable[[int], Mechanism]] = CHAINS | {
-    "arm 7": turned_arm,
-    "arm 30": turned_arm,
-    "tree 15": binary_tree,
-}
+COUNTED = CHAINS | {"arm 7": turned_arm, "arm 30": turned_arm, "tree 15": binary_tree}
 FITTED_FROM = 10  # links; below, the fixed part of the graph bends the curve
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
@@ -23,7 +22,6 @@ from tests.bench.tables import Table, digits
 from tests.bench.timing import relative_difference, run_fresh
 from viz.paper.mechanisms import turned_arm
 
-BUILT, REPEATS = (3, 20), 7  # links of the arms of `build_time`, and builds of each
 COMPILED = (10, 30, 100)  # links of the chains of `compile_time`
 LINKS = 1000  # of the chains of `long_chains`
 STATES = 3  # of each chain whose errors are taken
@@ -60,22 +58,6 @@ def planar(n: int) -> Mechanism:
 
 
 MODELS: dict[str, Callable[[int], Mechanism]] = {"planar": planar, "3D": turned_arm}
-
-
-def build_time(links: int | None = None, repeats: int = REPEATS) -> Iterator[Table]:
-    """Median, fastest and slowest build of forward dynamics, and its size. links: of an arm of this length alone."""
-    rows = []
-    for n in BUILT if links is None else (links,):
-        masses, lengths = [1.0 - 0.3 * i / n for i in range(n)], [1.1 - 0.4 * i / n for i in range(n)]
-        builds = [  # of an arm anew each time: its Lagrangian is kept
-            spent(lambda: forward_dynamics(planar_arm(masses, lengths, damping=0.1)))  # noqa: B023
-            for _ in range(repeats)
-        ]
-        seconds, graph = [each.seconds for each in builds], builds[-1].made
-        times = [f"{1e3 * each:.1f} ms" for each in (statistics.median(seconds), min(seconds), max(seconds))]
-        rows.append([str(n), *times, str(len(graph.nodes)), str(len(graph.edges))])
-    title = "forward dynamics of a planar arm, from its Lagrangian to the simplified graph"
-    yield Table(title, ["links", "median", "fastest", "slowest", "nodes", "edges"], rows, ())
 
 
 def compile_time(links: int | None = None) -> Iterator[Table]:

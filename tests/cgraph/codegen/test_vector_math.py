@@ -38,7 +38,9 @@ def angles():
     small = source.uniform(-10.0, 10.0, 2000)
     near = np.arange(1.0, 636000.0, 331.0) * (math.pi / 2)  # where the reduction cancels
     worst = 6381956970095103.0 * 2.0 ** -np.arange(33.0, 60.0)  # digits of a famous neighbour of a multiple of pi/2
-    return np.concatenate([spread, -spread, uniform, small, near, -near, worst, np.pi / 2 * np.arange(-40.0, 41.0)])
+    far = np.geomspace(1e6, 1.7e308, 1000)
+    quarters = np.pi / 2 * np.arange(-40.0, 41.0)
+    return np.concatenate([spread, -spread, uniform, small, near, -near, worst, far, -far, quarters])
 
 
 def exponents():

@@ -1,11 +1,9 @@
 """Single evaluations and huge angles of the stability table: exact values from other sources, errors that are seen."""
 
-import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from mpmath import mp, mpf
 from pytest import approx, mark
 
 import cgraph as cg
@@ -107,31 +105,3 @@ def test_a_constant_that_is_off_is_seen() -> None:
 
     arms = single_evaluations.Arms(off, 3, ["python"])
     assert not single_evaluations.measurement(single_evaluations.FAMILIES[0], arms).meets
-
-
-def test_angles_fill_their_range_with_both_signs() -> None:
-    found = single_evaluations.angles(6.0, 9.0, 1000)
-    assert np.min(np.abs(found)) >= 1e6
-    assert np.max(np.abs(found)) <= 1e9
-    assert 400 < np.count_nonzero(found > 0.0) < 600
-
-
-def test_sine_and_cosine_of_huge_angles_are_reduced_exactly() -> None:
-    found = list(single_evaluations.sine_results(100))
-    assert len(found) == 2 * len(single_evaluations.available())
-    assert all(each.meets for each in found), [each.measurements for each in found]
-
-
-def test_an_angle_that_is_reduced_in_float64_is_seen() -> None:
-    points = single_evaluations.angles(6.0, 9.0, 50)
-    known = single_evaluations.exact(points)
-    assert single_evaluations.ulps(np.array([np.sin(points), np.cos(points)]), known) <= 1.0
-    short = np.fmod(points, 2.0 * math.pi)
-    assert single_evaluations.ulps(np.array([np.sin(short), np.cos(short)]), known) > 1e3
-
-
-def test_sines_are_those_of_more_digits() -> None:
-    points = single_evaluations.angles(200.0, 308.0, 20)
-    with mp.workdps(400):
-        sines = [float(mp.sin(mpf(x))) for x in points.tolist()]
-    assert [float(each) for each in single_evaluations.exact(points)[0]] == sines

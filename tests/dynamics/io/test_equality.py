@@ -139,10 +139,10 @@ def test_anchors_that_the_compiler_computes_are_closed_where_the_file_has_the_bo
 
 
 def test_the_twin_of_a_mechanism_with_loops_is_its_tree() -> None:
-    from dynamics.io.mujoco_twin import MujocoTwin
+    from tests.mujoco_twin import AskedTwin
 
     bodies = [dyn.Body(name, dyn.Joint("revolute"), inertia=(1.0, 1.0, 2.0)) for name in "ab"]
-    twin = MujocoTwin(Mechanism(bodies, loops=[dyn.Loop("coupling", "b", "a", name="gear")]))
+    twin = AskedTwin(Mechanism(bodies, loops=[dyn.Loop("coupling", "b", "a", name="gear")]))
     assert twin.inverse(np.zeros(2), np.zeros(2), np.ones(2)) == approx([2.0, 2.0])
     for ask in (lambda: twin.accelerations(*np.zeros((3, 2))), lambda: twin.trajectory(*np.zeros((2, 2)), 1)):
         with raises(MechanismError, match=r"^MuJoCo has soft loops, and so no (accelerations|motions) of loop 'gear'$"):

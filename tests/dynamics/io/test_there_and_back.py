@@ -10,11 +10,11 @@ from pytest import importorskip, mark, raises
 
 import dynamics as dyn
 from dynamics import Body, Joint, Loop, Mechanism, MechanismError
-from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.io.stand_ins import STAND_IN
 from dynamics.multibody.trees.mechanism import WORLD
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation
 from tests.each_row import each_row
+from tests.mujoco_twin import AskedTwin
 
 EPS = 2.0**-52
 TURNED = 8 * EPS  # axes and rotations: angles or a quaternion, and their sines or squares, a few roundings each; what
@@ -207,7 +207,7 @@ def test_what_mujoco_does_not_take_is_refused(fields: dict[str, Any], message: s
 def test_a_zero_that_no_motion_shows_is_written_at_any_scale() -> None:
     """The moment of a planar rod about itself."""
     arm = dyn.planar_arm([1e-3] * 2, [1e-3] * 2)
-    twin, x = MujocoTwin(arm), np.array([0.3, -0.2])
+    twin, x = AskedTwin(arm), np.array([0.3, -0.2])
     assert twin.model.body_inertia[:, 2].tolist() == [0.0, STAND_IN, STAND_IN]
     M = list(dyn.mass_matrix(arm).evaluate({"q0": 0.3, "q1": -0.2, "qd0": 0.0, "qd1": 0.0}).values())
     assert twin.mass_matrix(x).ravel() == pytest.approx(M, rel=1e-12)

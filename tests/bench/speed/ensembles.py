@@ -1,4 +1,4 @@
-"""Ours beside peers where the bench has no task: differences at random states, ensembles, and closed chains."""
+"""Ensembles: many triple pendulums beside MuJoCo's rollout and JAX's vmap."""
 
 from __future__ import annotations
 
@@ -8,24 +8,15 @@ from functools import partial
 
 import numpy as np
 
-import cgraph as cg
 from cgraph._shared import Array
 from dynamics import scenes
-from dynamics.equations.equations_of_motion import forward_dynamics
-from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.experiments.timing import Timed, in_turns, load
-from dynamics.io.mujoco_module import mujoco
-from dynamics.io.write_mjcf import to_mjcf
-from dynamics.multibody.builders.planar_arm import planar_arm
-from dynamics.multibody.loops import Loop
-from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.simulation.ensembles.simulate_many import simulate_many
-from dynamics.verification.pinocchio_bodies import constraint_dynamics
 from tests.bench.peers.jax import JaxPeer
 from tests.bench.peers.mujoco import MujocoPeer, rollout
-from tests.bench.peers.peer import AnyState, PeerModel, TimedTask, made, rk4_step
+from tests.bench.peers.peer import AnyState, PeerModel, made, rk4_step
 from tests.bench.tables import Table
-from tests.bench.timing import relative_difference, repetitions, single_core, timed
+from tests.bench.timing import single_core
 
 # Ensembles: triple pendulums from the same states make the same steps of RK4, 1 s at 1 ms, on one core; times are of
 # the process's CPU, which other programs on the machine disturb less than they do the clock, per trajectory.
@@ -121,66 +112,3 @@ def _ensembles(count: int, repeats: int) -> Iterator[Table | str]:
     header = ["of CPU", "shortest", "longest", "by the clock", "of ours", "ends differ by", "at most"]
     title = f"{count} trajectories, peers {few}; load of the machine {load()}"
     yield Table(title, ["us a trajectory", *header], rows)
-
-
-# Closed chains: forward dynamics of chains pinned at their tips, a call at a time.
-SIZES, LENGTH = (3, 10, 40), 0.8  # links, m each
-PIN = (1.0, 0.0, 0.0)  # m, where the tip is held
-TURNS = 50  # each short, so that some are not disturbed
-PROXIMAL = 1e-12, 1e-10, 10  # Pinocchio's: what is left of the pin, its regularization, and iterations
-AGREE = 1e-6  # relative: Pinocchio's iteration, which stops before rounding
-
-
-def pinned(links: int) -> tuple[Mechanism, Mechanism]:
-    """A chain of rods, and the same with its tip held."""
-    arm = planar_arm([1.0] * links, [LENGTH] * links)
-    return arm, Mechanism(arm.bodies, arm.gravity, loops=[Loop("point", "tip", to_at=PIN)])
-
-
-def ours_held(held: Mechanism, x: Array) -> TimedTask:
-    """The compiled graph, bound to its arrays: accelerations and the force of the pin."""
-    compiled, n = cg.compile(forward_dynamics(held)), len(x) // 3
-    out = np.empty(compiled.n_out)
-    return TimedTask(compiled.bind(np.array(x), out), lambda _: out[:n])
-
-
-def pinocchio_held(held: Mechanism, x: Array) -> TimedTask:
-    """constraintDynamics, proximal, without its stabilisation."""
-    run, result = constraint_dynamics(held, PROXIMAL)(x)
-    return TimedTask(run, lambda _: result())
-
-
-def mujoco_connected(arm: Mechanism, x: Array) -> TimedTask:
-    """mj_forward with an equality constraint, which is soft: other accelerations, the same work."""
-    module, n = mujoco(), len(x) // 3
-    hold = f'<equality><connect body1="{arm.moving[-1].name}" anchor="0 0 {-LENGTH}"/></equality>'
-    model = module.MjModel.from_xml_string(to_mjcf(arm).replace("</worldbody>", f"</worldbody>{hold}"))
-    data = module.MjData(model)
-    data.qpos[:], data.qvel[:], data.qfrc_applied[:] = x[:n], x[n : 2 * n], x[2 * n :]
-    return TimedTask(lambda: module.mj_forward(model, data), lambda _: data.qacc)
-
-
-def closed_chains(repeats: int = TURNS, sizes: tuple[int, ...] = SIZES) -> Iterator[Table | str]:
-    """The table: nodes, microseconds a call, and ratios to ours, shortest of turns in one process."""
-    rows: list[list[str]] = []
-    absent: dict[str, str] = {}
-    for links in sizes:
-        arm, held = pinned(links)
-        rng = np.random.default_rng(links)
-        q, qd = nearest_state(held, 0.6 * rng.normal(size=links), rng.normal(size=links))
-        x = np.concatenate([q, qd, rng.normal(size=links)])
-        peers = {"Pinocchio": partial(pinocchio_held, held, x), "MuJoCo": partial(mujoco_connected, arm, x)}
-        calls = {"ours": ours_held(held, x)} | made(peers, absent)
-        results = {name: each.result(each.run()) for name, each in calls.items()}
-        if "Pinocchio" in calls and not (off := relative_difference(results["Pinocchio"], results["ours"])) <= AGREE:
-            raise ArithmeticError(f"{links} links: accelerations differ from Pinocchio's by {off:.1e} of the largest")
-        counts = {name: repetitions(each.run) for name, each in calls.items()}
-        turns = [{name: 1e6 * timed(each.run, counts[name]) for name, each in calls.items()} for _ in range(repeats)]
-        least = {name: min(turn[name] for turn in turns) for name in calls}
-        row = [str(links), str(len(forward_dynamics(held).nodes)), f"{least['ours']:.2f}"]
-        for name in ("Pinocchio", "MuJoCo"):
-            row += [f"{least[name]:.2f}", f"{least[name] / least['ours']:.1f}"] if name in least else ["-", "-"]
-        rows.append(row)
-    header = ["links", "nodes", "ours", "constraintDynamics", "ratio", "connect", "ratio"]
-    yield Table("chains pinned at the tip; microseconds a call", header, rows)
-    yield from [f"{name} is not measured: {missing}" for name, missing in absent.items()]
