@@ -9,21 +9,25 @@ which differs from f_0 in the side of surface j.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import columns, kept_by_first
-from cgraph.extend import Builder, building, folded, tangents, topological
+from cgraph.extend import Builder, Names, building, folded, tangents, topological
 
 from ..systems.arguments import new_variables
+from ..systems.model import display_names
 from .problem import Problem
 
 COMPARED = {"less", "less_equal"}
 KINKS = {"abs", "minimum", "maximum"}
 STEPS = {"floor", "ceil", "round"}
 SWITCHED = {"sign", "fmod", *COMPARED, *KINKS, *STEPS}
+LONGEST_WORDS = 60  # characters of a surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,16 +41,31 @@ class Switches:
     gaps: Graph  # g, less the n of a floor: zero at the lower end of a side, in a slide at the surface
     margins: Graph  # positive where the modes hold
     turns: tuple[tuple[int, int], ...]  # of each margin, the mode that turns where it is zero, and whether up or down
+    called: Mapping[str, str]  # {name of an input: what a person calls it}
 
-    @property
+    @cached_property
+    def sides(self) -> list[Node]:
+        """The side of each surface at a state, over the inputs alone."""
+        known: dict[Node, Node] = {}
+        for mode, g, spacing in zip(
+            cg.variables(list(self.modes)), self.surfaces.outputs.values(), self.spacing, strict=True
+        ):
+            (plain,) = folded([g], Builder(), known)
+            known[mode] = cg.sign(plain) if spacing == 2.0 else cg.floor(plain)
+        return list(known.values())
+
+    @cached_property
     def words(self) -> tuple[str, ...]:
-        """The surfaces as formulas."""
-        return tuple([str(cg.Graph(topological_inputs(g), {"g": g})) for g in self.surfaces.outputs.values()])
-
-
-def topological_inputs(node: Node) -> list[Node]:
-    """Variables that a node depends on."""
-    return [each for each in topological([node]) if each.op.name == "variable"]
+        """The surfaces as formulas, such as "qd.x", or "floor(t)"; dots stand for what is long."""
+        names = Names(Graph(self.gaps.inputs, {f"{k}": side for k, side in enumerate(self.sides)}), self.called)
+        texts = list[str]()
+        for side in self.sides:
+            g = side if side.op.name == "floor" else side.args[0]
+            first = g.args[0].value if g.op.name == "add" else None
+            text = names.text(g if first is None else g.args[1], LONGEST_WORDS)
+            text += "" if first is None else f" {'-' if first < 0.0 else '+'} {abs(first):.6g}"
+            texts.append(re.sub(r"%\d+", "..", text))
+        return tuple(texts)
 
 
 @kept_by_first
@@ -79,6 +98,7 @@ def switched(problem: Problem) -> Problem:
         _numbered(inputs, over),
         _numbered(inputs, margins),
         tuple(turns),
+        display_names(problem.model),
     )
     outputs = dict(zip(problem.rate.outputs, rates, strict=True))
     more = {name: _widened(getattr(problem, name), names) for name in ("projection", "multipliers", "velocities")}
@@ -225,6 +245,16 @@ def in_modes(problem: Problem, graph: Graph) -> Graph:
     return Graph(graph.inputs, dict(zip(graph.outputs, reader.read(list(graph.outputs.values())), strict=True)))
 
 
+def rows_in_modes(problem: Problem, make: Callable[[], Graph], among: frozenset[int]) -> Graph:
+    """A graph over states of the model, t and parameters as one over those of a problem in modes, mixed in slides."""
+    rate, graph = problem.rate, make()
+    more = in_modes(problem, problem.observed(graph.outputs)).outputs.values()
+    outputs = {**rate.outputs, **{f"row {name}": node for name, node in zip(graph.outputs, more, strict=True)}}
+    slid = replace(problem, rate=Graph(rate.inputs, outputs))
+    nodes = [*(sliding(slid, among) if among else slid).rate.outputs.values()]
+    return Graph(rate.inputs, dict(zip(graph.outputs, nodes[problem.size :], strict=True)))
+
+
 class _Places:
     """Numbers of nodes, the same for those of one structure."""
 
@@ -245,7 +275,8 @@ class _Places:
 def sliding(problem: Problem, among: frozenset[int]) -> Problem:
     """A problem in modes that slides on those surfaces, `among` others, whose modes are half way between two sides.
 
-    Its parameters are the same. Each step ends on the surfaces, moved there along the difference of the rates.
+    Its parameters are the same; what the rate has besides those of states is mixed, too. Each step ends on the
+    surfaces, moved there along the difference of the rates.
     """
     switches = problem.switches
     assert switches is not None
@@ -262,22 +293,22 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         folded([*rates, *[gaps[k] for k in chosen]], build, side)
         for side in (lower, *[lower | {modes[k]: lower[modes[k]] + switches.spacing[k]} for k in chosen])
     ]
-    f, g = first[:m], first[m:]
-    ways = dict(zip(states, f, strict=True)) | {inputs[m]: cg.constant(1.0)}
+    f, g = first[: len(rates)], first[len(rates) :]
+    ways = dict(zip(states, f, strict=False)) | {inputs[m]: cg.constant(1.0)}
     with building(build):
         # g of the upper end of a floor's lower side
         g = [gap - hold if switches.spacing[k] == 1.0 else gap for k, hold, gap in zip(chosen, holds, g, strict=True)]
-        jumps = [[there - here for there, here in zip(other[:m], f, strict=True)] for other in others]
+        jumps = [[there - here for there, here in zip(other, f, strict=False)] for other in others]
     drift, columns_of = (
         _along(g, ways, build),
-        [_along(g, dict(zip(states, jump, strict=True)), build) for jump in jumps],
+        [_along(g, dict(zip(states, jump, strict=False)), build) for jump in jumps],
     )
     # a jump that does not move its g itself, as that of an acceleration by a position, moves the rate of g
     late = [k for k, column in enumerate(columns_of) if column[k].value == 0.0]
     if late:
         g = [drift[k] if k in late else gap for k, gap in enumerate(g)]
         drift = _along(g, ways, build)
-        columns_of = [_along(g, dict(zip(states, jump, strict=True)), build) for jump in jumps]
+        columns_of = [_along(g, dict(zip(states, jump, strict=False)), build) for jump in jumps]
     with building(build):
         matrix = [
             [cg.where(holds[i] * holds[j], column[i], 1.0 if i == j else 0.0) for j, column in enumerate(columns_of)]

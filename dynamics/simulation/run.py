@@ -20,11 +20,12 @@ from cgraph._shared import Array, HoldsNodes, floats, kept_by_first
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import initial_values, other_inputs, start_state
 from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
-from ..integrators.switches import switched
+from ..integrators.switches import rows_in_modes, switched
 from ..systems.arguments import parameter_value
 from ..systems.model import Model, as_equations
 from .applied_force import Applied, Hold, Tau, with_applied
 from .events.event import Event, EventProgram, event_program
+from .events.modes import Modes, Turn
 from .outcome import (
     INTERRUPTED,
     REACHED,
@@ -42,7 +43,7 @@ from .stepper import Stepper, stepper_of
 from .steps.dense_output import Solution, StepBlock
 from .steps.equal_steps import step_count
 from .steps.row_values import converted
-from .trajectory import SimulationWarning, Trajectory
+from .trajectory import Sides, SimulationWarning, Trajectory
 
 if TYPE_CHECKING:
     from .ensembles.task import Workers
@@ -410,22 +411,35 @@ class Run(HoldsNodes):
             states[:, nq:],
             stats,
             {} if run.log is None else split_crossings(run.log.program, run.log.happened, nq, values),
-            RunGraphs(problem, applied, bound),
+            RunGraphs(problem, applied, bound, run.modes),
             None if steps is None else Solution(span.t0, x, steps, nq, velocities),
             None if hold is None else hold.held,
             applied.model.coordinates,
             applied.model.velocities,
             rows[:, nq:] if stepped.momenta else None,
+            *([] if run.modes is None else [_sides(run.modes)]),
         )
         if interrupted:
             raise InterruptedMotion(done)
         return done
 
 
+def _sides(modes: Modes) -> Sides:
+    """The sides of a run from each instant at which some of them change."""
+    kept = list[Turn]()
+    for turn in modes.turns:
+        if kept and turn.t == kept[-1].t:
+            kept.pop()
+        if not kept or turn.modes != kept[-1].modes:
+            kept.append(turn)
+    sides, spacing = np.array([turn.modes for turn in kept]), modes.plain.switches.spacing  # type: ignore[union-attr]
+    return Sides(modes.words, np.array([turn.t for turn in kept]), sides, (sides - 1.0) / spacing % 1.0 != 0.0)
+
+
 class RunGraphs(Mapping[str, Graph]):
     """The graphs of a trajectory, each made when it is first asked for.  bound: values of parameters."""
 
-    def __init__(self, problem: Problem, applied: Applied, bound: Mapping[str, float]) -> None:
+    def __init__(self, problem: Problem, applied: Applied, bound: Mapping[str, float], modes: Modes | None) -> None:
         self._made, self._bound = dict[str, Graph](), bound
         self._makers: dict[str, Callable[[], Any]] = {"rate": lambda: problem.rate}
         if problem.system is not None:
@@ -437,6 +451,11 @@ class RunGraphs(Mapping[str, Graph]):
             }
         if problem.multipliers is not None:
             self._makers["multipliers"] = lambda: problem.multipliers
+        if modes is not None:
+            among = frozenset[int]().union(*[turn.slides or () for turn in modes.turns])
+            for name in {*self._makers} - {"energy"}:
+                make = partial(rows_in_modes, modes.plain, self._makers[name], among)
+                self._makers[f"{name} in modes"] = make
 
     def __getitem__(self, name: str) -> Graph:
         if name not in self._made:

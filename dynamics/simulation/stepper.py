@@ -109,6 +109,7 @@ class Stepper(ABC):
         if self.modes is not None:
             if self.control is not None:
                 self._given = self._controlled(self.control.at(t0, x))
+            self.modes.direction = math.copysign(1.0, t_end - t0)
             self.modes.begin(t0, x, self._given)
             self._enter_modes()
         self._numbers[:], self.status = self._zero, "" if self.modes is None else self.modes.failed

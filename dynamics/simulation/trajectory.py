@@ -63,9 +63,8 @@ class Stats:
         Of equal steps, the estimated error of the state, phase included, the largest over the run, and that at the end,
         of the component where it is largest over its largest value. It is the difference from a run of steps twice as
         long over 2^k - 1, where one of steps four times as long tells the order k; where it is large, the difference
-        itself. Infinite where it is unknown, as where the rate has a jump or a kink on the way, which a warning
-        explains. None of chosen steps, without `estimate_error`, with a SampledController or events that reset the
-        state, and of runs that fail or end in the first steps.
+        itself. Infinite where it is unknown, which a warning explains. None of chosen steps, without `estimate_error`,
+        with a SampledController or events that reset the state, and of runs that fail or end in the first steps.
     warnings : tuple of str
         What speaks against the result, a sentence each; every one is issued as a `SimulationWarning`, too.
 
@@ -117,6 +116,50 @@ class Crossings(NamedTuple):
     qd: Array
 
 
+class Sides(NamedTuple):
+    """Sides of the surfaces on which a rate jumps or kinks, along a run.
+
+    Parameters
+    ----------
+    surfaces : tuple of str
+        The formulas that are zero there, such as "qd.x", or whole, such as "floor(t)". Numbers of the run stand as
+        numbers.
+    t : ndarray
+        The instants from which sides hold, the start among them, (k,) [s].
+    sides : ndarray
+        -1 or 1, the sign of the formula, or n of a floor, (k, n); half way between two in a slide.
+    slides : ndarray
+        Whether the motion slides on the surface, as a block that sticks does on that of its velocity, (k, n).
+
+    Examples
+    --------
+    A block slides to rest.
+
+    >>> import cgraph as cg
+    >>> import dynamics as dyn
+    >>> block = dyn.System(lambda q, qd, t: qd[0]**2 / 2, "x", forces=lambda q, qd, t: [-2.0 * cg.sign(qd[0])])
+    >>> run = dyn.simulate(block, [0.0], [3.0], t_end=4.0)
+    >>> run.modes.surfaces, run.modes.t.round(6).tolist(), run.modes.sides.tolist(), run.modes.slides.tolist()
+    (('qd.x',), [0.0, 1.5], [[1.0], [0.0]], [[False], [True]])
+    """
+
+    surfaces: tuple[str, ...]
+    t: Array
+    sides: Array
+    slides: Array
+
+    def at(self, times: Array) -> Array:
+        """The sides at the rows of a run, (T, n); at the first of two rows of one instant, of a reset, those before."""
+        way = -1.0 if self.t[-1] < self.t[0] else 1.0
+        after, before = (np.searchsorted(way * self.t, way * times, side) - 1 for side in ("right", "left"))
+        twice = np.append(times[1:] == times[:-1], False)
+        held: Array = self.sides[np.where(twice, before, after).clip(0)]
+        return held
+
+
+NO_SIDES = Sides((), np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0), dtype=bool))
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """The motion that `simulate` gives, a row for each recorded time.
@@ -142,6 +185,9 @@ class Trajectory:
         Names of the columns of q and of those of qd, qdd, tau and forces: `run["q.elbow"]` is such a column.
     p : ndarray, optional
         Momenta dL/dqd, (T, n), of a run with `form="momentum"`; `run["p.elbow"]` is a column.
+    modes : Sides
+        The surfaces on which the rate jumps or kinks, and which sides of them held, or where the motion slid on them:
+        by these are qdd, forces, tau and multipliers. The graphs are the plain equations.
 
     Examples
     --------
@@ -164,6 +210,7 @@ class Trajectory:
     coordinates: tuple[str, ...] = ()
     velocities: tuple[str, ...] = ()
     p: Array | None = None
+    modes: Sides = NO_SIDES
 
     def __getitem__(self, name: str) -> Array:
         """A column by its name, (T,): "q.elbow", "qd.elbow", "qdd.elbow", "tau.elbow", "forces.elbow", or a state.
@@ -337,8 +384,12 @@ class Trajectory:
     def _rows(self, name: str) -> Array:
         if name not in self.graphs:
             return np.empty_like(self.qd)
-        states = np.concatenate([self.q, self.qd], axis=1)
-        return row_values(self.graphs[name], self.t, states, () if self.held is None else self.held.at(self.t))
+        held = np.empty((len(self.t), 0)) if self.held is None else self.held.at(self.t)
+        qd, graph = self.qd, self.graphs[name]
+        if (in_modes := f"{name} in modes") in self.graphs:
+            graph, qd = self.graphs[in_modes], qd if self.p is None else self.p
+            held = np.concatenate([held, self.modes.at(self.t)], axis=1)
+        return row_values(graph, self.t, np.concatenate([self.q, qd], axis=1), held)
 
     success = property(attrgetter("stats.success"), doc="Whether the run reached t_end or ended at a terminal event.")
     status = property(attrgetter("stats.status"), doc="0: the end was reached; 1: a terminal event; -1: it failed.")
@@ -358,6 +409,7 @@ class Trajectory:
         what = f"{n} coordinate(s)" if self.qd.shape[1] else f"{n} state(s)"
         rows = f"{counted(len(self.t), 'row')}, t = {self.t[0]:g} .. {self.t[-1]:g} s" if len(self.t) else "no rows"
         happened = "".join([f", {len(crossings.t)} of event {name}" for name, crossings in self.events.items()])
+        happened += f", {counted(turns, 'turn')} at surfaces" if (turns := len(self.modes.t) - 1) > 0 else ""
         unknown = ["error not estimated"] if stats.error is None and not METHODS[stats.method].adaptive else []
         said = "; ".join([stats.message, *unknown, *[f"warning: {text}" for text in stats.warnings]])
         return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {counted(stats.steps, 'step')}, {said}>"

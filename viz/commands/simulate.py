@@ -16,6 +16,7 @@ from .command import Command
 
 METHOD = "dop853"
 SHOWN = 12  # states that the summary names
+SPANS = 4  # of slides on a surface that it tells
 MOST_ROWS = 1_000_000
 
 
@@ -91,8 +92,22 @@ def _summary(run: dyn.Trajectory) -> dict[str, Any]:
         "evaluations": stats.nfev,
         "seconds": stats.seconds,
         **energy,
+        **({"surfaces": found} if (found := _surfaces(run)) else {}),
         "end": dict(zip(names, [*run.q[-1].tolist(), *run.qd[-1].tolist()], strict=True)),
     }
+
+
+def _surfaces(run: dyn.Trajectory) -> dict[str, dict[str, Any]]:
+    """Of surfaces on which the rate jumps or kinks that the run met: how often, and the spans [s] in which it slid."""
+    import numpy as np
+
+    found, (surfaces, t, sides, slides) = dict[str, dict[str, Any]](), run.modes
+    for k, name in enumerate(surfaces):
+        met = int(((sides[1:, k] != sides[:-1, k]) > slides[:-1, k]).sum())
+        edges = np.flatnonzero(np.diff(slides[:, k].astype(int), prepend=0, append=0))
+        if met or len(edges):
+            found[name] = {"met": met, "slides": np.append(t, run.t[-1])[edges].reshape(-1, 2).tolist()}
+    return found
 
 
 def _limited(scene: dyn.Scene) -> dict[str, dict[str, tuple[float, float]]]:
@@ -132,6 +147,11 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
             f"  energy  {data['energy']:.6g} J at the start, {data['energy_at_end']:.6g} J at the end, "
             f"changed by {data['energy_drift']:.2g} J at most"
         )
+    for name, each in data.get("surfaces", {}).items():
+        spans = [f"t = {start:.6g} .. {end:.6g} s" for start, end in each["slides"][:SPANS]]
+        spans += [f"{more} times more"] if (more := len(each["slides"]) - SPANS) > 0 else []
+        slid = f", stays there {', '.join(spans)}" if spans else ""
+        lines.append(f"  surface {name}: met {_shared.counted(each['met'], 'time')}{slid}")
     if "beyond_limits" in data:
         looked = "" if data["limits_looked_at_in"] == "steps" else ", by the rows alone"
         lines += [f"  limits  {each}{looked}" for each in data["beyond_limits"] or ["kept throughout"]]

@@ -1,4 +1,4 @@
-"""`cgraph why`: what makes a torque, by cause and body, and by which paths of the graph it depends on an input."""
+"""`cgraph why`: what makes a torque, by which paths it depends on an input, and where the rate jumps or kinks."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from .points import REST, SHOWN, filled, point_text
 if TYPE_CHECKING:
     from ..models.causes import CauseTable
 
+KINDS = {"jump": "jumps, ", "kink": "kinks, the slope of ", "smooth": "no change near this state"}
 PATHS = 5  # that are listed and drawn where nothing else is said
 
 
@@ -48,6 +49,9 @@ def add(parser: Command) -> None:
         "--nan", action="store_true", help="where a value that is not finite, or a derivative by INPUT, comes from"
     )
     parser.add_argument(
+        "--switches", action="store_true", help="on which surfaces the rate jumps or kinks, and by how much near --at"
+    )
+    parser.add_argument(
         "--k", type=counting, default=PATHS, metavar="K", help=f"paths to list, heaviest first (default: {PATHS})"
     )
     parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"at which state; {REST}")
@@ -57,6 +61,9 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> int | None:
     """Print causes, then paths and what they add up to; of two that are not connected, where the chain stops."""
+    if options.switches:
+        _switches(options)
+        return None
     if not options.output and not options.nan:
         raise ValueError("why needs to know WHAT: a torque, such as tau0, or a cause, such as gravity")
     if options.svg and not (options.input or options.nan):
@@ -152,6 +159,25 @@ def _nan(options: argparse.Namespace, scene: dyn.scenes.Scene, names: library.Na
     marked = {found.node} & set(names.graph.nodes)
     answer_and_draw(options, unless_json(options, found.to_dict(), found), names.graph, scene, marked=marked)
     return 1 if found.what else 0
+
+
+def _switches(options: argparse.Namespace) -> None:
+    """Print the surfaces on which the rate jumps or kinks, drawn in it as the nodes that switch."""
+    if options.output:
+        raise ValueError(f"--switches is about the whole rate, and not about {options.output!r}")
+    scene = scene_of(options)
+    rate = dyn.hamilton_equations(scene) if options.momentum else dyn.state_equation(scene)
+    names, at = library.Names(rate, dyn.display_names(scene)), filled(rate, scene, options.at)
+    found = library.surfaces(scene, at, "momentum" if options.momentum else "velocity")
+    lines = [f"Near {point_text({names.shown(name): x for name, x in at.items()}, len(at) if options.at else SHOWN)}:"]
+    for each in found:
+        by = ", ".join([f"{names.shown(name)} by {value:.6g}" for name, value in each.by.items()])
+        tags = f"  [{', '.join(each.tags)}]" if each.tags else ""
+        lines.append(f"  {each.formula}{tags}: {KINDS[each.kind]}{by}")
+    text = "\n".join(lines) if found else "The rate is smooth: nothing in it switches."
+    data = {"at": at, "surfaces": [each._asdict() for each in found]}
+    marked = {"switches": {node for node in rate.nodes if node.op.name in library.SWITCHED}}
+    answer_and_draw(options, unless_json(options, data, text), rate, scene, marked=marked)
 
 
 def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: library.Names, output: str) -> None:

@@ -162,8 +162,8 @@ function showCounts(app) {
 }
 
 function showLegend(app) {
-  const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"], ["off", "wrong result"]];
-  const present = new Set(app.version.labels.map(([, role]) => role));
+  const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"], ["off", "wrong result"], ["switch", "switches: jumps or kinks"]];
+  const present = new Set([...app.version.labels.map(([, role]) => role), app.version.ops.some((op) => ROWS[op]?.switches) ? "switch" : ""]);
   if (app.version.marked.size || app.version.blamed.length) present.add("wrong");
   else if (app.version.off.size) present.add("off");
   byId("legend").replaceChildren(...kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => tag("span", { class: kind }, words)));

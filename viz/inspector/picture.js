@@ -159,11 +159,11 @@ function drawNodes(canvas) {
       const { local, x, y } = innerOf(plan, c), i = local.get(place), box = layout.boxes[c];
       at = { x: box.x + (box.w - innerOf(plan, c).width) / 2 + x[i] - w / 2, y: box.y + BOX.title + y[i] - NODE / 2, w, h: NODE };
     }
-    const role = roleOf(version, node);
-    const item = shape(shapes, `n${node}`, at, `${leaf ? "leaf" : "node"} ${role}`, caption(version, node), "", !leaf);
+    const role = roleOf(version, node), switches = ROWS[op]?.switches;
+    const item = shape(shapes, `n${node}`, at, `${leaf ? "leaf" : "node"} ${role}${switches ? " switch" : ""}`, caption(version, node), "", !leaf);
     item.group.setAttribute("data-node", node);
     const name = version.names[node] && (called.get(version.names[node][0]) ?? version.names[node][0]);
-    const words = [leaf ? "" : `%${version.number[node]}`, name ?? op, role === "wrong" ? "spurious" : ""].filter(Boolean).join(", ");
+    const words = [leaf ? "" : `%${version.number[node]}`, name ?? op, role === "wrong" ? "spurious" : "", switches ? "switches: its value or its slope jumps" : ""].filter(Boolean).join(", ");
     item.group.setAttribute("aria-label", words);
     element("title", {}, item.group).textContent = words;
     keep(canvas, `n${node}`, item, [node], "");

@@ -19,7 +19,8 @@ from dynamics.equations.equations_of_motion import gravity_force, momentum
 from dynamics.equations.formulations.formulations import momentum_rate
 from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation, state_inputs
-from dynamics.integrators import TABLEAUS
+from dynamics.integrators import TABLEAUS, derive, in_form
+from dynamics.integrators.switches import switched
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.multibody.trees.joint_positions import contact_surfaces, drawn_points, view
 from dynamics.multibody.trees.mechanism import Mechanism
@@ -39,6 +40,8 @@ NOTES = {
     "torque": "holding: the torque or force that keeps it at rest here against gravity and springs. "
     "dp/dt: the rate of the momentum p.",
     "rate": "of the state, as the equations have them",
+    "side": "which side of each surface holds on which the rate jumps or kinks: -1 or 1, or n of a floor. The steps of "
+    "this page go across, so that nothing sticks; those of cgraph simulate end there, and what should stick does.",
 }
 USUAL = {"rad": math.pi, "rad/s": 10.0}  # how far sliders reach at least; 1 of all else
 SHARE = 0.25  # of the steps that a method of order 5 chooses
@@ -115,6 +118,8 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
     values |= _momenta(scene, values) if momentum else {}
     start = {name: values.get(name, 0.0) for name in rate.input_names}  # torques and the time are 0
     outputs, meters = _meters(scene, rate)
+    sides, of_sides = _sides(scene, "momentum" if momentum else "velocity")
+    outputs, meters = outputs | sides, meters + of_sides
     places_, parents, radii = _places(scene, rate, start)
     shown = cg.simplify(Graph(rate.inputs, outputs | places_))
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
@@ -150,8 +155,20 @@ def _first_order(scene: Scene) -> Live:
     rate = state_equation(scene)
     values = dict(zip(scene.coordinates, scene.q, strict=True)) | dict(scene.parameters)
     start = {name: float(values.get(name, 0.0)) for name in rate.input_names}  # the time is 0
-    meters = [(f"d {name}/dt", "", "rate") for name in scene.coordinates]
-    return Live(rate, start, rate, meters, dt=_step(scene), methods=TABLEAUS, units={"t": "s"})
+    sides, of_sides = _sides(scene)
+    meters, shown = (
+        [(f"d {name}/dt", "", "rate") for name in scene.coordinates],
+        Graph(rate.inputs, rate.outputs | sides),
+    )
+    return Live(rate, start, shown, meters + of_sides, dt=_step(scene), methods=TABLEAUS, units={"t": "s"}, notes=NOTES)
+
+
+def _sides(scene: Scene, form: str = "velocity") -> tuple[dict[str, Node], list[tuple[str, str, str]]]:
+    """The sides of surfaces on which the rate jumps or kinks, and their meters."""
+    switches = switched(in_form(derive(scene, {}), form)).switches
+    if switches is None:
+        return {}, []
+    return {f"side{k}": each for k, each in enumerate(switches.sides)}, [(each, "", "side") for each in switches.words]
 
 
 def _adjustable(mechanism: Mechanism) -> Mechanism:

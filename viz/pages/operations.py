@@ -32,6 +32,7 @@ def operations() -> str:
             "arity": op.arity,
             "commutative": op.commutative,
             "selects": op.selects,
+            "switches": bool(op.piece or op.jumps) and op.arity < 3,  # a `where` does as its condition does
             "rounding": op.rounding,
             "singular": op.singular is not None,
             "slopes": slopes(op),

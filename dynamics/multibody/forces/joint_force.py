@@ -156,7 +156,7 @@ class JointLimit(JointForce):
 
 @dataclass(frozen=True, eq=False)
 class JointFriction(JointForce):
-    """Dry friction of a joint, regularized: -loss tanh(qd / velocity). It creeps where true friction would stick.
+    """Dry friction of a joint, regularized: -loss tanh(qd / velocity). It creeps where `cg.sign` in a force sticks.
 
     Parameters
     ----------

@@ -29,8 +29,8 @@ class Event(HoldsNodes):
     What touches zero and turns back counts too, with direction 0. What stays zero for a while has one event, where it
     arrives; what starts there has none before it comes back, but for a contact, with a reset and a direction, if it
     closes. Of events at one instant those without a reset are first; then the first reset in the list that is due,
-    again and again: what is zero and moves in its direction. A jump by a reset is no crossing. The quantity is looked
-    at 16 to 1024 times in a step; where that is too few, `Stats.warnings` says so: take a shorter `max_step` or `dt`.
+    again and again: what is zero and moves in its direction. A jump by a reset is no crossing, and a pole is no zero.
+    Crossings are found by bounds over each step, however short they are; where bounds stay too wide, a warning says so.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ class Modes:
     def __init__(self, problem: Problem) -> None:
         assert problem.switches is not None
         self.plain, self._switches = problem, problem.switches
-        self.values = np.ones(len(self._switches.modes))
+        self.values, self.direction = np.ones(len(self._switches.modes)), 1.0  # -1 where time runs back
         self.turns = list[Turn]()
         self.failed = ""
         self._spacing = np.array(self._switches.spacing)
@@ -260,7 +260,7 @@ class _Choice:
             states = self._x[:, None] + AT_ONCE * self._of.sizes[:, None] * ways
             fixed = np.concatenate([[self._t], self._p, self._modes_at(sides)])[:, None]
             points = np.concatenate([states, np.broadcast_to(fixed, (len(fixed), ways.shape[1]))])
-            values = outputs_of(_drift(self._of.plain, 1), points)[self._among]
+            values = self._of.direction * outputs_of(_drift(self._of.plain, 1), points)[self._among]
             off = 4.0 * np.abs(values[:, 1:] - values[:, :1]).max(axis=1) + 16.0 * UNIT * np.abs(values[:, 0])
             self._known[key] = values[:, 0], off
         return self._known[key]

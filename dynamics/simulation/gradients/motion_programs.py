@@ -89,7 +89,7 @@ def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     graphs: dict[str, Any] = {name: over_numbers(getattr(problem, name)) for name in OVER_INPUTS}
     outputs = {str(variable.name): node for variable, node in numbers.items()}
     if switches is not None:
-        wide = {name: over_numbers(getattr(switches, name)) for name in ("gaps", "margins")}
+        wide: dict[str, Any] = {name: over_numbers(getattr(switches, name)) for name in ("gaps", "margins")}
         graphs["switches"] = replace(switches, **wide)
     parameters = (*problem.parameters[:forces], *names, *outputs, *modes)
     made = replace(problem, parameters=parameters, multipliers=None, **graphs)

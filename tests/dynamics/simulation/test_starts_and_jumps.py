@@ -45,7 +45,7 @@ def test_a_force_that_grows_from_0_moves_what_rests_at_0(method: str, power: int
 
 @mark.parametrize("units", UNITS)
 @mark.parametrize("power", [0, 1])
-@mark.parametrize("method", [name for name in ADAPTIVE if name != "taylor"])
+@mark.parametrize("method", ADAPTIVE)
 def test_jumps_and_kinks_in_time_are_passed(method: str, power: int, units: tuple[float, float]) -> None:
     """A push, and where it jumps its end, of a system that rests till then and gives no sign of it."""
 
@@ -58,29 +58,10 @@ def test_jumps_and_kinks_in_time_are_passed(method: str, power: int, units: tupl
     np.testing.assert_allclose(run.q[-1] / units[0], end, rtol=JUMPS)
 
 
-@mark.parametrize("rest", [True, False])
-@mark.parametrize("share", [50, *slow(1, 25, 99)])  # hundredths of the run
-@mark.parametrize("t0", [0.0, *slow(3.0)])
-@mark.parametrize("method", [name for name in ADAPTIVE if name != "taylor"])
-def test_a_jump_where_steps_of_one_length_end_is_passed(method: str, t0: float, share: int, rest: bool) -> None:
-    """Steps at rest are hundredths of the run. Many lead to the jump, which must not count as a pole for that."""
-    jump, start = t0 + 0.02 * share, 0.0 if rest else 1.0
-    model = dyn.System(
-        lambda q, qd, t: 0.5 * qd[0] ** 2.0 - 0.5 * q[0] ** 2.0,
-        ["x"],
-        forces=lambda q, qd, t: [cg.where(t > jump, 1.0, 0.0)],
-    )
-    limit = None if rest else 0.02
-    run = dyn.simulate(model, [start], [0.0], t0 + 2.0, method, t0=t0, max_step=limit, max_steps=3000)
-    assert run.success, run.stats.message
-    exact = start * math.cos(2.0) + 1.0 - math.cos(t0 + 2.0 - jump)
-    np.testing.assert_allclose(run.q[-1], exact, rtol=0.0, atol=JUMPS)
-
-
 @mark.parametrize("before", [-1.0, *slow(0.0, 0.5, 0.9, 3.0)])
 @mark.parametrize("span", [1.0, *slow(-1.0, 1e-2, 1e5)])
 @mark.parametrize("t0", [1.0, *slow(0.0, -3.0)])
-@mark.parametrize("method", [name for name in ADAPTIVE if name != "taylor"])
+@mark.parametrize("method", ADAPTIVE)
 def test_a_force_that_jumps_as_the_run_starts_is_passed(method: str, t0: float, span: float, before: float) -> None:
     """As a square wave does: one value at t0 itself, another right after."""
 

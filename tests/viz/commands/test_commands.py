@@ -296,6 +296,7 @@ ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["y"])
 free = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2, ["x"])
 planet = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 1.0 / q[0], "r phi")
 runaway = dyn.System(lambda q, qd, t: qd[0] ** 2 / 2 + q[0] ** 4, "x")
+belt = dyn.System(lambda q, qd, t: qd[0] ** 2 / 2, "x", forces=lambda q, qd, t: [-2.0 * cg.sign(qd[0] - 0.5)])
 late = dyn.Scene("late", "it ends at infinity", runaway, (1.0,), (0.0,), 9.0)
 """
 
@@ -365,6 +366,18 @@ def test_a_motion_is_written_as_csv_and_summed_up(own, figures):
     assert found["energy_drift"] == np.abs(run.energy - run.energy[0]).max()
     assert found["rows"] == 4
     assert found["steps"] == run.stats.steps
+
+
+def test_surfaces_of_a_model_and_those_that_a_motion_met_are_told(own, said, figures):
+    command = ["simulate", "own.py:belt", "--start", "qd.x=2", "--t-end", "1"]
+    assert figures(*command)["surfaces"] == {"qd.x - 0.5": {"met": 1, "slides": [[pytest.approx(0.75), 1.0]]}}
+    assert "  surface qd.x - 0.5: met 1 time, stays there t = 0.75 .. 1 s\n" in said(*command)
+    assert "surfaces" not in figures("simulate", "own.py:free", "--start", "qd.x=2", "--t-end", "1")
+    (found,) = figures("why", "own.py:belt", "--switches", "--at", "qd.x=1")["surfaces"]
+    assert found == {"formula": "qd.x - 0.5", "tags": ["force"], "kind": "jump", "by": {"qd0_dot": -4.0}}
+    assert "  qd.x - 0.5  [force]: jumps, qd_dot.x by -4\n" in said("why", "own.py:belt", "--switches")
+    assert said("why", "own.py:free", "--switches") == "The rate is smooth: nothing in it switches.\n"
+    assert cli.main(["why", "own.py:belt", "tau.x", "--switches"]) == 2
 
 
 def test_a_motion_is_stepped_in_momenta(own, said, figures):

@@ -77,6 +77,16 @@ def test_the_spurious_branch_is_seen_at_once_and_gone_by_the_chain_rule(show):
     assert titles == ["link 1", "link 2", "link 3", "damping"]  # no column for the Euler step, which is not in it
 
 
+def test_nodes_that_switch_are_dotted_and_in_the_legend(visit, tmp_path):
+    x = cg.variable("x")
+    for name, graph in (("smooth", cg.sin(x)), ("kinks", cg.where(cg.less(x, 1.0), abs(x), 2.0 * x))):
+        (tmp_path / f"{name}.html").write_text(viz.page(cg.Graph([x], {"y": graph})), encoding="utf-8")
+        page = visit(tmp_path / f"{name}.html")
+        assert page.locator(".node.switch").count() == (2 if name == "kinks" else 0)
+        assert ("switches: jumps or kinks" in page.inner_text("#legend")) == (name == "kinks")
+    assert page.locator(".switch title").first.text_content() == "%1, less, switches: its value or its slope jumps"
+
+
 def test_rows_without_nodes_are_not_named(show):
     """On a tall page the column of the Euler step is alone in its band, and the chain rule has nothing in it."""
     page = show(width=1400, height=2600)

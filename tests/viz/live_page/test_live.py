@@ -90,6 +90,16 @@ def test_meters_and_points_are_those_of_the_library(script, live):
     assert script("run.now().values[data.energy]") == pytest.approx(energy, abs=ROUNDING * 30)
 
 
+def test_a_meter_says_which_side_holds():
+    block = dyn.System(lambda q, qd, t: qd[0] ** 2 / 2, "x", forces=lambda q, qd, t: [-2.0 * cg.sign(qd[0] - 0.5)])
+    for model, name in ((block, "qd.x - 0.5"), (dyn.OdeSystem(lambda x, t: [cg.sign(0.5 - x[0])], "x"), "x - 0.5")):
+        script = Script(live_of(of_model(model)))
+        (k,) = [k for k, each in enumerate(script("data.meters")) if each["called"] == name]
+        assert script("data.notes.side").startswith("which side of each surface holds")
+        assert [script(f"(run.set({'qd' in name:d}, {v}), run.now().meters[{k}])") for v in (0, 1)] == [-1, 1]
+        script.engine.close()
+
+
 def test_too_long_a_step_shows_its_error_at_once(script):
     """Nothing has moved yet; the error ahead grows with the order of the method, and is small at the page's dt."""
     errors = []
