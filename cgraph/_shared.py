@@ -19,7 +19,7 @@ if TYPE_CHECKING:
         real_number as real_number,
     )
     from .core.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
-    from .core.label import UNLABELLED as UNLABELLED
+    from .core.label import SMOOTH as SMOOTH, UNLABELLED as UNLABELLED
     from .core.scope import without_collection as without_collection
     from .explain.lint.lint import Lint as Lint
     from .explain.why_nan import WhyNan as WhyNan

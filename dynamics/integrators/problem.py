@@ -77,7 +77,7 @@ class Problem:
     @property
     def portable(self) -> Problem:
         """The problem without its model, which pickles: enough to step a problem in modes."""
-        return replace(self, model=None, system=None)
+        return replace(self, model=None, system=None)  # type: ignore[arg-type]
 
     @cached_property
     def timed(self) -> bool:

@@ -12,7 +12,7 @@ from cgraph._shared import Array
 
 from ..systems.model import Model
 from .problem import derive, in_form
-from .switches import switched
+from .rate_in_modes import switched
 
 NEAREST = 8  # steps to a surface by its slope
 SMALL = 1e-7  # of the rate, or its slope, there and at the state, below which a difference is rounding

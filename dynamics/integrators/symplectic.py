@@ -38,8 +38,8 @@ from cgraph.extend import (
 from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import TIME, new_variables
 from .problem import Problem, reaches
+from .rate_in_modes import in_modes
 from .step import Step, Values, advanced, call, count, numbered, stage_time, summed, total
-from .switches import in_modes
 from .tableau import HALF, MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned
 
 TURNS = 60.0  # of the iteration for the stages, at most

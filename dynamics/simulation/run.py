@@ -20,7 +20,7 @@ from cgraph._shared import Array, HoldsNodes, floats, kept_by_first
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import initial_values, other_inputs, start_state
 from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
-from ..integrators.switches import rows_in_modes, switched
+from ..integrators.rate_in_modes import rows_in_modes, switched
 from ..systems.arguments import parameter_value
 from ..systems.model import Model, as_equations
 from .applied_force import Applied, Hold, Tau, with_applied

@@ -62,7 +62,7 @@ class Stepper(ABC):
 
     def __post_init__(self) -> None:
         self._passes, self._given, self._first = FIRST_PASSES, list(self.parameters), 0.0
-        self._plain, self._pending = self.compiled, list[tuple[Crossing, StepBlock]]()
+        self._plain, self._pending = self.compiled, list[tuple[int, float, Array, float]]()
         self._load(self.compiled)
         if self.control is None:
             self.set_parameters(self._given)
@@ -130,14 +130,14 @@ class Stepper(ABC):
     def _turn(self, t_end: float) -> None:
         """Go on where a surface is crossed, at the end of a block, with a step as long as the one that ends there."""
         assert self.modes is not None
-        ((crossing, block),), self._pending = self._pending, []
-        t, x, sizes = float(block.t[-1]), block.x[-1].copy(), self.modes.sizes
+        number, t, x, h = self._pending.pop()
+        sizes = self.modes.sizes
         self._before = {name: getattr(self, name) for name in COUNTED}
-        self.modes.turn(t, x, self._given, crossing.number)
+        self.modes.turn(t, x, self._given, number)
         self._enter_modes()
         self._numbers[:], self.status = self._zero, self.modes.failed
         self.x[:] = x
-        self._first = float(abs(block.h[-1]))
+        self._first = abs(h)
         self._begin(t, t_end)
         if (name := f"{START}so_far") in self.runner.program.registers:
             self.runner.write(self._memory, name, sizes)
@@ -170,14 +170,14 @@ class Stepper(ABC):
             for block in self._recorded(span, looked):
                 parts = [block]
                 if self.modes is not None:
-                    parts, crossing = self._up_to_crossing(block)
+                    parts, crossing = self._up_to_crossing(block, span.t_end)
                 if log is not None:
                     log.parameters = self.parameters
                     parts = [log(self.with_dense(parts[0]))]
                     crossing = None if log.ended or log.restart else crossing
                 self.steps -= len(block.t) - sum([len(part.t) for part in parts])
-                is_over = crossing is None or parts[-1].t[-1] == span.t_end
-                self._pending = [] if is_over else [(crossing, parts[-1])]
+                if crossing is None:
+                    self._pending.clear()
                 yield from [part for part in parts if len(part.t)]
                 if crossing is not None or (log is not None and (log.ended or log.restart)):
                     self.status = ""  # of a step beyond
@@ -201,7 +201,7 @@ class Stepper(ABC):
             self._before, self._first = {name: getattr(self, name) for name in COUNTED}, 0.0
             self.begin(x, t, span.t_end)
 
-    def _up_to_crossing(self, block: StepBlock) -> tuple[list[StepBlock], Crossing | None]:
+    def _up_to_crossing(self, block: StepBlock, t_end: float) -> tuple[list[StepBlock], Crossing | None]:
         """The steps up to where the first surface is crossed, and this; or all."""
         assert self.modes is not None
         if block.dense is not None or self.log is not None:
@@ -217,13 +217,14 @@ class Stepper(ABC):
                 self._is_unsure, first = True, f"surfaces may be crossed unseen, first after t = {part.t_old[0]:.6g} s"
                 self.warnings.append(f"{first}: take a shorter dt or max_step")
             if crossing is not None:
-                rows, s = np.array([crossing.row]), np.array([crossing.s])
-                last = part.part(slice(crossing.row + 1)).ending(
-                    float(part.times_at(rows, s)[0]), part.states_at(rows, s)[0]
-                )
-                before = block.part(slice(int(np.flatnonzero(block.t_old == last.t_old[0])[0])))
-                self.modes.see(last.x)
-                return [each for each in (before, last) if len(each.t)], crossing
+                row, at = crossing.row, (np.array([crossing.row]), np.array([crossing.s]))
+                t, x = float(part.times_at(*at)[0]), part.states_at(*at)[0]
+                self._pending = [(crossing.number, t, x, float(part.h[row]))] if t != t_end else []
+                self.modes.see(x)
+                moves = t != part.t_old[row]
+                last = part.part(slice(row + moves))
+                first = int(np.flatnonzero(block.t_old == part.t_old[0])[0])
+                return [*[block.part(slice(first))][: first > 0], last.ending(t, x) if moves else last], crossing
         self.modes.see(block.x)
         return [block], None
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from dynamics.experiments.work_precision import named_tasks, work_precision
     from dynamics.experiments.work_precision.work_precision import to_csv
     from dynamics.integrators import TABLEAUS
+    from dynamics.integrators.rate_in_modes import SWITCHED
     from dynamics.integrators.surfaces import surfaces
-    from dynamics.integrators.switches import SWITCHED
     from dynamics.io.load import compiled
     from dynamics.multibody.bodies.joint_coordinates import display_units
     from dynamics.multibody.changes.pruning import PruneResult

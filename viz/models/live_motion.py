@@ -20,7 +20,7 @@ from dynamics.equations.formulations.formulations import momentum_rate
 from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.integrators import TABLEAUS, derive, in_form
-from dynamics.integrators.switches import switched
+from dynamics.integrators.rate_in_modes import switched
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.multibody.trees.joint_positions import contact_surfaces, drawn_points, view
 from dynamics.multibody.trees.mechanism import Mechanism

@@ -19,7 +19,7 @@ from cgraph._shared import Array, require_path, require_whole
 from ...equations.state_equation import FORMS
 from ...equations.states.initial_value import initial_values
 from ...integrators import derive, in_form
-from ...integrators.switches import switched
+from ...integrators.rate_in_modes import switched
 from ...systems.model import Model
 from ..applied_force import SampledController, with_applied
 from ..events.event import Event, as_events, event_program

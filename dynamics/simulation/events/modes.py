@@ -15,7 +15,8 @@ from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Builder, tangents
 
 from ...integrators import Problem
-from ...integrators.switches import Switches, sliding
+from ...integrators.rate_in_modes import sliding
+from ...integrators.switches import Switches
 from ..steps.dense_output import UNIT, StepBlock
 from .crossing_search import Crossing, Quantities, first_crossing, outputs_of, quantities, steps_near_zero
 from .event import rounding_errors

@@ -19,9 +19,9 @@ from cgraph.extend import STATEMENTS, Builder, Call, Map, Program, Statement, fo
 
 from ...equations.substitute import substitute
 from ...integrators import Method, Problem
+from ...integrators.rate_in_modes import sliding
 from ...integrators.step import with_registers
 from ...integrators.step_control import equal_registers
-from ...integrators.switches import sliding
 from ...systems.arguments import TIME, new_variables
 from ..steps.step_program import normalizing
 from .rate_pullback import RatePullback, rate_pullback, sharing

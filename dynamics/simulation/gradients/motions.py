@@ -18,7 +18,7 @@ from cgraph.extend import Builder, topological
 from ...equations.state_equation import FORMS, StateInputs, state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Problem, derive, in_form, quantity
-from ...integrators.switches import switched
+from ...integrators.rate_in_modes import switched
 from ...systems.arguments import TIME, Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
 from ...systems.ode_system import OdeSystem

@@ -1,0 +1,349 @@
+"""Switches: a rate that jumps or kinks as a smooth one, whose sides of switching surfaces are inputs, its modes.
+
+Where g passes zero, sign(g), |g|, a < b, max(a, b) and their kin take another piece. A mode says which side of such a
+surface holds: -1 or 1, or n of a floor. In a slide, of a mode half way between two sides, the rate is mixed from
+those of both so that g stays zero (Filippov 1988): f = f_0 + sum_j w_j (f_j - f_0), with shares 0 <= w <= 1 of f_j,
+which differs from f_0 in the side of surface j.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph._shared import SMOOTH, columns, kept_by_first
+from cgraph.extend import Builder, building, folded, tangents, topological
+
+from ..systems.arguments import new_variables
+from ..systems.model import display_names
+from .problem import Problem
+from .switches import Switches
+
+COMPARED = {"less", "less_equal"}
+KINKS = {"abs", "minimum", "maximum"}
+STEPS = {"floor", "ceil", "round"}
+SWITCHED = {"sign", "fmod", *COMPARED, *KINKS, *STEPS}
+
+
+@kept_by_first
+def switched(problem: Problem) -> Problem:
+    """The problem in modes; the same object where the rate is smooth, or has solvers of its own."""
+    if problem.missing is not None or not any([node.op.name in SWITCHED for node in problem.rate.nodes]):
+        return problem
+    reader = _Reader(problem)
+    rates = reader.read(list(problem.rate.outputs.values()))
+    used = reader.used(rates)
+    if not used:
+        return problem
+    inputs = [*problem.rate.inputs, *[surface.mode for surface in used]]
+    over = [surface.gap for surface in used]
+    margins, turns = list[Node](), list[tuple[int, int]]()
+    with building(reader.build):
+        for k, surface in enumerate(used):
+            if surface.spacing == 1.0:
+                margins += [surface.gap, 1.0 - surface.gap]
+                turns += [(k, -1), (k, 1)]
+            else:
+                margins.append(surface.mode * surface.gap)
+                turns.append((k, 0))
+    names = tuple([str(surface.mode.name) for surface in used])
+    switches = Switches(
+        names,
+        _numbered(inputs, [surface.quantity for surface in used]),
+        tuple([surface.spacing for surface in used]),
+        tuple([surface.is_sign for surface in used]),
+        _numbered(inputs, over),
+        _numbered(inputs, margins),
+        tuple(turns),
+        display_names(problem.model),
+    )
+    outputs = dict(zip(problem.rate.outputs, rates, strict=True))
+    wide = ("projection", "multipliers", "velocities", "momentum")
+    more: dict[str, Any] = {name: _widened(getattr(problem, name), names) for name in wide}
+    parameters = (*problem.parameters, *names)
+    return replace(problem, parameters=parameters, rate=Graph(inputs, outputs), switches=switches, **more)
+
+
+def _numbered(inputs: Sequence[Node], nodes: Sequence[Node]) -> Graph:
+    return Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})
+
+
+def _widened(graph: Graph | None, names: Sequence[str]) -> Graph | None:
+    """The graph with inputs besides that it does not use."""
+    return graph and Graph([*graph.inputs, *cg.variables(list(names))], graph.outputs)
+
+
+@dataclass
+class _Surface:
+    """A surface that was read: its mode, the quantity, and this less the n of a floor."""
+
+    mode: Node
+    quantity: Node
+    gap: Node
+    spacing: float
+    is_sign: bool = False
+
+
+class _Reader:
+    """Reads nodes into modes."""
+
+    def __init__(self, problem: Problem, known: Switches | None = None) -> None:
+        self.build, self._taken = Builder(), [*problem.rate.input_names]
+        self._surfaces: dict[tuple[Node, float], _Surface] = {}
+        self._places, self._known = _Places(), dict[tuple[int, float], Node]()
+        if known is not None:
+            of = zip(known.surfaces.outputs.values(), known.spacing, cg.variables(list(known.modes)), strict=True)
+            self._known = {(self._places.of(g), spacing): mode for g, spacing, mode in of}
+
+    def read(self, nodes: Sequence[Node]) -> list[Node]:
+        """Copies of nodes with modes in place of what switches."""
+        new: dict[Node, Node] = {}
+        with building(self.build) as labelled:
+            for node in topological(nodes):
+                if not node.args:
+                    new[node] = node
+                    continue
+                labelled(node.label)
+                args = [new[arg] for arg in node.args]
+                is_read = node.op.name in SWITCHED and SMOOTH not in node.roles
+                made = self._piece(node.op.name, args) if is_read else None
+                new[node] = self.build(node.op, tuple(args), node.label, node.name) if made is None else made
+        return [new[node] for node in nodes]
+
+    def used(self, rates: Sequence[Node]) -> list[_Surface]:
+        """Surfaces that rates depend on, or others of these, in the order in which they were read."""
+        reached, waiting = set[Node](), list(rates)
+        by_mode = {surface.mode: surface for surface in self._surfaces.values()}
+        while waiting:
+            for node in topological([waiting.pop()]):
+                if node in by_mode and node not in reached:
+                    reached.add(node)
+                    waiting.append(by_mode[node].gap)
+        return [surface for mode, surface in by_mode.items() if mode in reached]
+
+    def _piece(self, name: str, args: list[Node]) -> Node | None:
+        """The piece of an operation that modes choose; None where it never switches."""
+        if all([arg.value is not None for arg in args]):
+            return None
+        a, b = args[0], args[-1]
+        if name in STEPS:
+            sign, offset = {"floor": (1.0, 0.0), "ceil": (-1.0, 0.0), "round": (1.0, 0.5)}[name]
+            return sign * self._mode(sign * a + offset, 1.0)[0]
+        if name == "fmod":
+            quotient = a / b
+            side = self._side(quotient)
+            return None if side is None else a - b * (side * self._mode(side * quotient, 1.0)[0])
+        side = self._side(a if len(args) == 1 else a - b, is_sign=name == "sign")
+        if side is None:
+            return None
+        if name == "sign":
+            return side
+        if name == "abs":
+            return side * a
+        below = 0.5 * (1.0 - side)
+        if name in COMPARED:
+            return below
+        return cg.where(below, a, b) if name == "minimum" else cg.where(below, b, a)
+
+    def _side(self, g: Node, *, is_sign: bool = False) -> Node | None:
+        """The sign of g as a mode, shared by what is g but for a constant factor; None where it is never zero."""
+        sign = 1.0
+        while True:
+            if g.op.name == "neg":
+                g, sign = g.args[0], -sign
+            elif g.op.name == "mul" and (factor := g.args[0].value):
+                g, sign = g.args[1], math.copysign(sign, factor * sign)
+            elif g.op.name == "sub" and (g.args[0].value is not None or g.args[0].serial > g.args[1].serial):
+                g, sign = g.args[1] - g.args[0], -sign
+            else:
+                break
+        if g.value is not None:
+            return cg.constant(math.copysign(sign, g.value * sign)) if g.value else None
+        if _excludes_zero(g):
+            return None
+        mode, surface = self._mode(g, 2.0)
+        surface.is_sign |= is_sign
+        return mode if sign > 0.0 else -mode
+
+    def _mode(self, g: Node, spacing: float) -> tuple[Node, _Surface]:
+        if (g, spacing) not in self._surfaces:
+            if self._known and (mode := self._known.get((self._places.of(g), spacing))) is not None:
+                self._surfaces[g, spacing] = _Surface(mode, g, g if spacing == 2.0 else g - mode, spacing)
+                return mode, self._surfaces[g, spacing]
+            (mode,) = new_variables("mode", 1, self._taken)
+            self._taken.append(str(mode.name))
+            self._surfaces[g, spacing] = _Surface(mode, g, g if spacing == 2.0 else g - mode, spacing)
+        surface = self._surfaces[g, spacing]
+        return surface.mode, surface
+
+
+def _excludes_zero(g: Node) -> bool:
+    """Whether g is on one side of zero for any values of its variables."""
+    anything, bounds = (-math.inf, math.inf), dict[Node, tuple[float, float]]()
+    for node in topological([g]):
+        op = columns(node.op)
+        if node.value is not None:
+            bounds[node] = (node.value, node.value)
+        elif not node.args or op.interval is None:
+            bounds[node] = anything
+        elif len(node.args) == 2 and node.args[0] is node.args[1] and op.interval_of_same is not None:
+            bounds[node] = op.interval_of_same(bounds[node.args[0]])
+        else:
+            bounds[node] = op.interval(*[bounds[arg] for arg in node.args])
+    low, high = bounds[g]
+    return low > 0.0 or high < 0.0
+
+
+@kept_by_first
+def in_modes(problem: Problem, graph: Graph) -> Graph:
+    """Another graph over states, t and parameters, of which what switches as the rate does is in its modes."""
+    if problem.switches is None:
+        return graph
+    reader = _Reader(problem, problem.switches)
+    return Graph(graph.inputs, dict(zip(graph.outputs, reader.read(list(graph.outputs.values())), strict=True)))
+
+
+def rows_in_modes(problem: Problem, make: Callable[[], Graph], among: frozenset[int]) -> Graph:
+    """A graph over states of the model, t and parameters as one over those of a problem in modes, mixed in slides."""
+    rate, graph = problem.rate, make()
+    more = in_modes(problem, problem.observed(graph.outputs)).outputs.values()
+    outputs = {**rate.outputs, **{f"row {name}": node for name, node in zip(graph.outputs, more, strict=True)}}
+    slid = replace(problem, rate=Graph(rate.inputs, outputs))
+    nodes = [*(sliding(slid, among) if among else slid).rate.outputs.values()]
+    return Graph(rate.inputs, dict(zip(graph.outputs, nodes[problem.size :], strict=True)))
+
+
+class _Places:
+    """Numbers of nodes, the same for those of one structure."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[object, ...], int] = {}
+
+    def of(self, node: Node) -> int:
+        """Number of a node."""
+        places: dict[Node, int] = {}
+        for each in topological([node]):
+            leaf = each.name if each.value is None and not each.args else each.value
+            key = (each.op.name, leaf, *[places[arg] for arg in each.args])
+            places[each] = self._known.setdefault(key, len(self._known))
+        return places[node]
+
+
+@kept_by_first
+def sliding(problem: Problem, among: frozenset[int]) -> Problem:
+    """A problem in modes that slides on those surfaces, `among` others, whose modes are half way between two sides.
+
+    Its parameters are the same; what the rate has besides those of states is mixed, too. Each step ends on the
+    surfaces, moved there along the difference of the rates.
+    """
+    switches = problem.switches
+    assert switches is not None
+    build, m = Builder(), problem.size
+    inputs = problem.rate.inputs
+    modes, states = inputs[len(inputs) - len(switches.modes) :], list(inputs[:m])
+    rates, gaps = list(problem.rate.outputs.values()), list(switches.gaps.outputs.values())
+    chosen = sorted(among)
+    with building(build):
+        # of a mode that slides, h = 1, the lower side, else its own
+        holds = [_slides(modes[k], switches.spacing[k]) for k in chosen]
+        lower = {modes[k]: modes[k] - 0.5 * switches.spacing[k] * hold for k, hold in zip(chosen, holds, strict=True)}
+    first, *others = [
+        folded([*rates, *[gaps[k] for k in chosen]], build, side)
+        for side in (lower, *[lower | {modes[k]: lower[modes[k]] + switches.spacing[k]} for k in chosen])
+    ]
+    f, g = first[: len(rates)], first[len(rates) :]
+    ways = dict(zip(states, f, strict=False)) | {inputs[m]: cg.constant(1.0)}
+    with building(build):
+        # g of the upper end of a floor's lower side
+        g = [gap - hold if switches.spacing[k] == 1.0 else gap for k, hold, gap in zip(chosen, holds, g, strict=True)]
+        jumps = [[there - here for there, here in zip(other, f, strict=False)] for other in others]
+    drift, columns_of = (
+        _along(g, ways, build),
+        [_along(g, dict(zip(states, jump, strict=False)), build) for jump in jumps],
+    )
+    # a jump that does not move its g itself, as that of an acceleration by a position, moves the rate of g
+    late = [k for k, column in enumerate(columns_of) if column[k].value == 0.0]
+    if late:
+        g = [drift[k] if k in late else gap for k, gap in enumerate(g)]
+        drift = _along(g, ways, build)
+        columns_of = [_along(g, dict(zip(states, jump, strict=False)), build) for jump in jumps]
+    with building(build):
+        matrix = [
+            [cg.where(holds[i] * holds[j], column[i], 1.0 if i == j else 0.0) for j, column in enumerate(columns_of)]
+            for i in range(len(chosen))
+        ]
+        rights = [[cg.where(h, -value, 0.0) for h, value in zip(holds, part, strict=True)] for part in (drift, g)]
+        shares, moves = _solved(matrix, rights)
+        rate = [_mixed(each, shares, [jump[i] for jump in jumps]) for i, each in enumerate(f)]
+        onto = [_mixed(each, moves, [jump[i] for jump in jumps]) for i, each in enumerate(states)]
+        surfaces = list(switches.surfaces.outputs.values())
+        for hold, surface in zip(holds, [surfaces[k] for k in chosen], strict=True):
+            if surface in states:  # a state that stays zero does so exactly
+                i = states.index(surface)
+                rate[i], onto[i] = cg.where(hold, 0.0, rate[i]), cg.where(hold, 0.0, onto[i])
+        margins, turns = list[Node](), list[tuple[int, int]]()
+        place = {k: (hold, share) for k, hold, share in zip(chosen, holds, shares, strict=True)}
+        for (k, way), margin in zip(switches.turns, switches.margins.outputs.values(), strict=True):
+            if k not in place:
+                margins.append(margin)
+                turns.append((k, way))
+                continue
+            hold, share = place[k]
+            for side, inside in ((-1, share), (1, 1.0 - share)):
+                if way in (0, side):
+                    own = margin if way or side < 0 else cg.constant(1.0)
+                    margins.append(cg.where(hold, inside, own))
+                    turns.append((k, side))
+    made = replace(switches, margins=_numbered(inputs, margins), turns=tuple(turns))
+    project = _numbered(inputs, onto)
+    if problem.projection is not None:
+        nodes = list(problem.projection.outputs.values())
+        project = _numbered(
+            inputs, folded(list(project.outputs.values()), build, dict(zip(states, nodes, strict=True)))
+        )
+    outputs = dict(zip(problem.rate.outputs, rate, strict=True))
+    return replace(problem, rate=Graph(inputs, outputs), projection=project, switches=made, slides=True)
+
+
+def _slides(mode: Node, spacing: float) -> Node:
+    """1 where a mode is half way between two sides, else 0."""
+    return 1.0 - mode * mode if spacing == 2.0 else 2.0 * (mode - cg.floor(mode))
+
+
+def _along(g: Sequence[Node], seeds: Mapping[Node, Node], build: Builder) -> list[Node]:
+    """The derivatives of quantities along a direction."""
+    found = tangents({node: seed for node, seed in seeds.items() if seed.value != 0.0}, list(g), build)
+    return [found.get(node, cg.constant(0.0)) for node in g]
+
+
+def _mixed(start: Node, shares: Sequence[Node], jumps: Sequence[Node]) -> Node:
+    """start + sum of share * jump."""
+    for share, jump in zip(shares, jumps, strict=True):
+        start = start + share * jump
+    return start
+
+
+def _solved(matrix: list[list[Node]], rights: list[list[Node]]) -> list[list[Node]]:
+    """The solutions of A w = b for several b, by elimination in the order as it is."""
+    n = len(matrix)
+    for k in range(n):
+        for i in range(k + 1, n):
+            factor = matrix[i][k] / matrix[k][k]
+            if factor.value == 0.0:
+                continue
+            matrix[i] = [
+                *matrix[i][: k + 1],
+                *[a - factor * b for a, b in zip(matrix[i], matrix[k], strict=True)][k + 1 :],
+            ]
+            for right in rights:
+                right[i] = right[i] - factor * right[k]
+    for right in rights:
+        for k in reversed(range(n)):
+            for j in range(k + 1, n):
+                right[k] = right[k] - matrix[k][j] * right[j]
+            right[k] = right[k] / matrix[k][k]
+    return rights
