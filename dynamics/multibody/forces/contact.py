@@ -207,8 +207,8 @@ def touch(contact: Contact, body: KinematicChain, to: KinematicChain) -> Touch:
     if not vanishes(contact.friction) and _sticks(contact):
         for line in spatial.to_z(unit_axis("normal", contact.normal)).T[:2]:
             across = to.direction(spatial.constant(line))
-            slip = cg.where(touching, dot(across, velocity), 1.0)  # apart there is no surface to search
-            force = plus(force, scaled(-friction * pressed * cg.sign(slip), across))
+            speed = cg.where(touching, dot(across, velocity), 1.0)  # apart there is no surface to search
+            force = plus(force, scaled(-friction * pressed * cg.sign(speed), across))
     elif not vanishes(contact.friction):
         slip = plus(velocity, scaled(-rate, along))
         share = friction * pressed / cg.sqrt(dot(slip, slip) + slow * slow)

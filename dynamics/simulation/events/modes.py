@@ -155,7 +155,7 @@ class Modes:
             allowed = outputs_of(_gap_errors(self.plain), point[:, None])[:, 0]
             moved = ~(slid | floors | crossed) & (self.values * gaps < -allowed)
             self.values = np.where(moved, -self.values, self.values)
-            if not moved.any():
+            if not np.any(moved):
                 break
         upper_end = floors & ~slid & (np.abs(gaps - 1.0) <= allowed)
         zero = (np.abs(gaps - np.where(floors & slid, 0.5, 0.0)) <= allowed) | upper_end | crossed | slid
