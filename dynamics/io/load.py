@@ -54,7 +54,8 @@ def load_mjcf(
     limits : pair of floats, optional
         (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
     friction : float, optional
-        A velocity [rad/s or m/s]; friction loss then acts as loss tanh(qd / friction), see `JointFriction`.
+        A velocity [rad/s or m/s] with which friction loss acts, as loss tanh(qd / friction); with 0 it sticks, as
+        loss sign(qd), see `JointFriction`.
     actuators : bool
         Take motors, position and velocity servos and the like on hinges and slides, see `Actuator`. Their inputs are
         parameters, "ctrl_" and the actuator's name (or number), 0 where nothing else is said.
@@ -124,7 +125,8 @@ def load_urdf(
     limits : pair of floats, optional
         (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
     friction : float, optional
-        A velocity [rad/s or m/s]; friction loss then acts as loss tanh(qd / friction), see `JointFriction`.
+        A velocity [rad/s or m/s] with which friction loss acts, as loss tanh(qd / friction); with 0 it sticks, as
+        loss sign(qd), see `JointFriction`.
     contacts : "compliant" or mapping of str to float or str, optional
         Take collision shapes that are spheres, and the ends of capsules, as compliant contacts with the ground, the
         plane through the world's origin across gravity, with the numbers of `load_mjcf` and a friction of 1. Other

@@ -55,8 +55,8 @@ def smooth(
         if pair.shape != (2,) or not (np.isfinite(pair).all() and pair[0] > 0.0 and pair[1] >= 0.0):
             raise MechanismError(f"limits must be (stiffness > 0, damping >= 0) of springs, got {limits!r:.60}")
         springs = (float(pair[0]), float(pair[1]))
-    if friction is not None and not 0.0 < real_number("friction", friction) < math.inf:
-        raise MechanismError(f"friction must be a velocity > 0, at which most of it acts, got {friction!r}")
+    if friction is not None and not 0.0 <= real_number("friction", friction) < math.inf:
+        raise MechanismError(f"friction must be a velocity >= 0, at which most of it acts, got {friction!r}")
     return Smooth(springs, friction, require_flag("actuators", actuators), asked(contacts))
 
 

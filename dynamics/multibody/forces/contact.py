@@ -34,6 +34,11 @@ class Contact:
     slope are continuous at the touch. F is smooth dry friction. It is less than `friction` N, and it creeps where
     true friction sticks: under a load of s friction N, s < 1, with s / sqrt(1 - s^2) of `velocity`.
 
+    With velocity 0, on a plane, friction sticks: F = friction N (sign(v_1) t_1 + sign(v_2) t_2) with v_t along two
+    tangents. Of these t_1 is the axis of `to` nearest to the plane, put into it, and t_2 = n x t_1: x and y for a
+    normal z. It is a pyramid in place of the cone: right in motions along a tangent, all plane ones in the planes of
+    axes among them, and up to sqrt(2) too large between. Motions rest and break away as with `JointFriction`.
+
     Parameters
     ----------
     body, to : str
@@ -57,7 +62,8 @@ class Contact:
     friction : float or parameter
         Coefficient of friction, at least 0.
     velocity : float or parameter
-        The speed [m/s] at which 0.71 of the friction acts. It must be positive where there is friction.
+        The speed [m/s] at which 0.71 of the friction acts; 0, the default, is friction that sticks. It must be
+        positive for two spheres, and of a parameter.
 
     Notes
     -----
@@ -68,8 +74,8 @@ class Contact:
     the force is NaN. The force is one of the `forces` of a mechanism and no potential: `energy` is without what the
     contact stores, which `Mechanism.contact` tells.
 
-    There is no rigid contact, no friction that sticks, and no rolling or torsional friction. Bodies touch where they
-    have a `Contact` and nowhere else.
+    There is no rigid contact, and no rolling or torsional friction. Bodies touch where they have a `Contact` and
+    nowhere else.
 
     Examples
     --------
@@ -116,7 +122,7 @@ class Contact:
 def _positive(what: str, value: object) -> float | Node:
     number = quantity(what, value)
     if not isinstance(number, Node) and number == 0.0:
-        raise MechanismError(f"{what} must be positive where there is friction, got {value!r}")
+        raise MechanismError(f"{what} must be positive where spheres rub, and as a parameter, got {value!r}")
     return number
 
 
@@ -126,6 +132,10 @@ CONTACT_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
     "friction": quantity,
     "velocity": _positive,
 }
+
+
+def _sticks(contact: Contact) -> bool:
+    return contact.to_radius is None and vanishes(contact.velocity)
 
 
 def check_contact(contact: Contact, bodies: Container[str]) -> None:
@@ -147,7 +157,7 @@ def check_contact(contact: Contact, bodies: Container[str]) -> None:
     if contact.radius == contact.to_radius == 0.0:
         raise MechanismError(f"{where}: two points do not touch, one of radius and to_radius must be positive")
     for name, check in CONTACT_QUANTITIES.items():
-        if name != "velocity" or not vanishes(contact.friction):
+        if name != "velocity" or not (vanishes(contact.friction) or _sticks(contact)):
             check(f"{where}: {name}", getattr(contact, name))
 
 
@@ -188,13 +198,18 @@ def touch(contact: Contact, body: KinematicChain, to: KinematicChain) -> Touch:
     stiffness, dissipation, friction, slow = (as_node(symbol(getattr(contact, name))) for name in CONTACT_QUANTITIES)
     touching = cg.less(0.0, depth)
     inside = cg.where(touching, depth, 1.0)  # apart, the slope of the root of 0 would be infinite
-    # a step that leaves the surface has stages beyond it, where the law goes on
-    pressed = cg.where(touching, stiffness * inside * cg.sqrt(cg.hypot(inside, 0.0)), 0.0)
+    # a step that leaves the surface has stages beyond it, where the law goes on; its slope at the surface is 0
+    pressed = cg.where(touching, stiffness * cg.hypot(inside, 0.0) ** 1.5, 0.0)
     energy = 0.4 * pressed * inside
     if not vanishes(contact.dissipation):
         pressed = pressed * cg.maximum(1.0 - dissipation * rate, 0.0)
     force = scaled(pressed, along)
-    if not vanishes(contact.friction):
+    if not vanishes(contact.friction) and _sticks(contact):
+        for line in spatial.to_z(unit_axis("normal", contact.normal)).T[:2]:
+            across = to.direction(spatial.constant(line))
+            speed = cg.where(touching, dot(across, velocity), 1.0)  # apart there is no surface to search
+            force = plus(force, scaled(-friction * pressed * cg.sign(speed), across))
+    elif not vanishes(contact.friction):
         slip = plus(velocity, scaled(-rate, along))
         share = friction * pressed / cg.sqrt(dot(slip, slip) + slow * slow)
         force = plus(force, scaled(-share, slip))

@@ -156,7 +156,11 @@ class JointLimit(JointForce):
 
 @dataclass(frozen=True, eq=False)
 class JointFriction(JointForce):
-    """Dry friction of a joint, regularized: -loss tanh(qd / velocity). It creeps where `cg.sign` in a force sticks.
+    """Dry friction of a joint: -loss sign(qd), which sticks, or -loss tanh(qd / velocity), which creeps.
+
+    A motion with the first comes to rest where qd is 0, stays while what pulls is at most `loss`, and then breaks away:
+    it slides on the surface qd = 0 between the two signs, by the share of each that holds qdd at 0. Graphs of their
+    own, as `forward_dynamics`, do not know a share: sign(0) is 0.
 
     Parameters
     ----------
@@ -165,19 +169,20 @@ class JointFriction(JointForce):
     loss : float
         The force of every freedom that slides [N m or N]. In its place may stand a parameter, as in a `Body`.
     velocity : float
-        At which about three quarters of it act, > 0 [rad/s or m/s].
+        At which about three quarters of it act [rad/s or m/s]; 0 is the first law, the default.
 
     Examples
     --------
     >>> import dynamics as dyn
     >>> cart = dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
-    >>> rough = dyn.Mechanism([cart], forces=[dyn.JointFriction("cart", loss=4.0, velocity=0.01)])
-    >>> dyn.forward_dynamics(rough).evaluate({"q0": 0.0, "qd0": 1.0, "tau0": 0.0})
-    {'qdd0': -2.0}
+    >>> rough = dyn.Mechanism([cart], forces=[dyn.JointFriction("cart", loss=4.0)])
+    >>> run = dyn.simulate(rough, [0.0], [1.0], t_end=9.0)
+    >>> run.q[-1].round(9), run.qd[-1]
+    (array([0.25]), array([0.]))
     """
 
     loss: Quantity
-    velocity: float
+    velocity: float = 0.0
 
     @property
     def quantities(self) -> Mapping[str, Callable[[str, object], object]]:
@@ -188,12 +193,11 @@ class JointFriction(JointForce):
         """Raises MechanismError for numbers out of range."""
         quantity(f"{self.label}: loss", self.loss)
         self._require("velocity", self.velocity, 0.0)
-        if self.velocity == 0.0:
-            raise MechanismError(f"JointFriction on body {self.body!r}: velocity must be positive, got 0.0")
 
     def along(self, q: Sequence[Node], qd: Sequence[Node], parameters: Mapping[str, Node]) -> list[Node]:
         """The force on every velocity."""
-        return [-symbol(self.loss) * cg.tanh(rate / self.velocity) for rate in qd]
+        shares = [cg.tanh(rate / self.velocity) if self.velocity else cg.sign(rate) for rate in qd]
+        return [-symbol(self.loss) * share for share in shares]
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,11 +148,16 @@ class Modes:
 
     def _decide(self, t: float, x: Array, p: Sequence[float], crossed: Array, number: int = -1) -> None:
         """What holds from here on, of the surfaces at zero; crossed: those of which the mode has turned."""
-        gaps = self._gaps(t, x, p)
-        errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))
-        point = np.append(self._point(t, x, p, self.values[:, None])[:, 0], errors)
-        allowed = outputs_of(_gap_errors(self.plain), point[:, None])[:, 0]
         slid, floors = self.slid, self._spacing == 1.0
+        errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))
+        for _ in range(len(self.values) + 1):  # a mode that has turned may move the surfaces of later ones
+            gaps = self._gaps(t, x, p)
+            point = np.append(self._point(t, x, p, self.values[:, None])[:, 0], errors)
+            allowed = outputs_of(_gap_errors(self.plain), point[:, None])[:, 0]
+            moved = ~(slid | floors | crossed) & (self.values * gaps < -allowed)
+            self.values = np.where(moved, -self.values, self.values)
+            if not np.any(moved):
+                break
         upper_end = floors & ~slid & (np.abs(gaps - 1.0) <= allowed)
         zero = (np.abs(gaps - np.where(floors & slid, 0.5, 0.0)) <= allowed) | upper_end | crossed | slid
         self._fresh = np.where(zero, allowed, np.nan)

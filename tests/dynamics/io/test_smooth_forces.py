@@ -143,10 +143,20 @@ def test_a_limit_gives_back_what_it_took_but_for_its_damping(side: float, unit: 
 
 
 def test_friction_brings_a_body_to_rest_in_the_time_of_dry_friction() -> None:
-    """v0 m / loss, but for the last creep."""
-    run = dyn.simulate(cart(dyn.JointFriction("cart", 4.0, 1e-4)), [0.0], [1.0], 0.6, "radau", t_eval=[0.4, 0.6])
-    assert run.qd[:, 0] == approx([1.0 - 4.0 / 2.0 * 0.4, 0.0], abs=1e-3)
-    assert (run.forces * run.qd <= 0.0).all()
+    """v0 m / loss, but for the last creep of the smooth law."""
+    for friction, error in ((dyn.JointFriction("cart", 4.0, 1e-4), 1e-3), (dyn.JointFriction("cart", 4.0), 1e-12)):
+        run = dyn.simulate(cart(friction), [0.0], [1.0], 0.6, "radau", t_eval=[0.4, 0.6])
+        assert run.qd[:, 0] == approx([1.0 - 4.0 / 2.0 * 0.4, 0.0], abs=error)
+        assert (run.forces * run.qd <= 0.0).all()
+
+
+@mark.parametrize(("method", "dt"), [("dop853", None), ("radau", None), ("rk4", 0.01)])
+def test_friction_sticks_until_the_load_is_more(method: str, dt: float | None) -> None:
+    """Pulled by 2 t from rest, a cart of 2 kg breaks away at t = 2, as loss is 4, and is at (t - 2)^3 / 6."""
+    model = cart(dyn.JointFriction("cart", 4.0))
+    run = dyn.simulate(model, [0.0], [0.0], 3.0, method, dt=dt, tau=lambda q, qd, t: [2.0 * t], t_eval=[1.9, 3.0])
+    assert run.q[:, 0] == approx([0.0, 1.0 / 6.0], abs=RUN_ERROR)
+    assert run.qd[:, 0] == approx([0.0, 0.5], abs=RUN_ERROR)
 
 
 def test_joint_forces_go_with_their_bodies() -> None:
@@ -169,7 +179,7 @@ def test_joint_forces_go_with_their_bodies() -> None:
     [
         (dyn.JointLimit("cart", 1.0, -1.0, 1e3), "lower must be below upper"),
         (dyn.JointLimit("cart", -1.0, 1.0, -1.0), "stiffness must be finite and at least 0"),
-        (dyn.JointFriction("cart", 1.0, 0.0), "velocity must be positive"),
+        (dyn.JointFriction("cart", 1.0, -1.0), "velocity must be finite and at least 0"),
         (dyn.Actuator("cart", "u", gain=(1.0,)), "gain needs three finite numbers"),
         (dyn.Actuator("cart", "u", force_range=(1.0, -1.0)), "force_range must be"),
         (dyn.Actuator("nobody", "u"), "unknown body 'nobody'"),
@@ -180,7 +190,7 @@ def test_a_joint_force_out_of_range_is_refused(force: dyn.JointForce, message: s
         cart(force)
 
 
-@mark.parametrize("options", [{"limits": (0.0, 1.0)}, {"limits": (1.0,)}, {"friction": 0.0}, {"friction": math.nan}])
+@mark.parametrize("options", [{"limits": (0.0, 1.0)}, {"limits": (1.0,)}, {"friction": -1.0}, {"friction": math.nan}])
 def test_options_out_of_range_are_refused(options: dict[str, Any]) -> None:
     with raises(dyn.MechanismError, match=next(iter(options))):
         dyn.load_urdf(ROBOT, **options)

@@ -89,17 +89,63 @@ def test_a_ball_that_slips_rolls_at_five_sevenths_of_its_speed() -> None:
     assert abs(sliding[-1]) < slow
 
 
-def test_on_a_slope_a_block_creeps_as_stated() -> None:
-    """Under a load of s friction N with s / sqrt(1 - s^2) of the velocity."""
-    s, mu, slow = 0.8, 0.5, 1e-3
-    slope = math.atan(s * mu)
+def on_slope(slope: float, **material: Any) -> tuple[dyn.Mechanism, float]:
+    """A block, in axes turned with the slope, and the height at which it rests."""
     pull = (GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope))
     slide = dyn.Body("rail", dyn.Joint("prismatic", (0.0, 0.0, 1.0)))
     block = dyn.Body("block", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), "rail", mass=MASS)
-    ground = dyn.Contact("block", **(MATERIAL | {"friction": mu, "velocity": slow}))
     sink = (MASS * GRAVITY * math.cos(slope) / MATERIAL["stiffness"]) ** (2.0 / 3.0)
-    run = dyn.simulate(dyn.Mechanism([slide, block], pull, [ground]), [-sink, 0.0], [0.0, 0.0], 1.0, "rodas")
+    return dyn.Mechanism([slide, block], pull, [dyn.Contact("block", **(MATERIAL | material))]), -sink
+
+
+def test_on_a_slope_a_block_creeps_as_stated() -> None:
+    """Under a load of s friction N with s / sqrt(1 - s^2) of the velocity."""
+    s, mu, slow = 0.8, 0.5, 1e-3
+    model, height = on_slope(math.atan(s * mu), friction=mu, velocity=slow)
+    run = dyn.simulate(model, [height, 0.0], [0.0, 0.0], 1.0, "rodas")
     assert run.qd[-1] == approx([0.0, slow * s / math.sqrt(1.0 - s * s)], abs=1e-6 * slow)
+
+
+RK4 = {"dt": 1e-3, "estimate_error": False}
+THROWS = [(0.0, 3.0, "radau", {}), (0.0, -3.0, "rk4", RK4), (0.9, -2.0, "dop853", {}), (0.9, 0.0, "rk4", RK4)]
+
+
+@mark.parametrize(("load", "speed", "method", "options"), [*THROWS, (1.1, 0.0, "dop853", {})])
+def test_true_friction_stops_a_block_and_lets_it_go_at_its_angle(
+    load: float, speed: float, method: str, options: dict[str, Any]
+) -> None:
+    """On tan(slope) = load mu it stops after v^2 / 2 a and stays for load < 1, and accelerates for load > 1."""
+    mu = 0.5
+    slope = math.atan(load * mu)
+    model, height = on_slope(slope, friction=mu, velocity=0.0)
+    run = dyn.simulate(model, [height, 0.0], [0.0, speed], 1.0, method, **options)
+    drive, brake = GRAVITY * math.sin(slope), mu * GRAVITY * math.cos(slope)
+    stops = math.copysign(speed * speed, speed) / 2.0 / (brake - math.copysign(drive, speed)) if load < 1.0 else 0.0
+    slips = max(drive - brake, 0.0)
+    assert [run.q[-1, 1], run.qd[-1, 1]] == approx([stops + 0.5 * slips, slips], rel=STEPS, abs=1e-15)
+
+
+def test_a_foot_that_lands_sticks_whichever_way_it_slips() -> None:
+    """Before it touches its slip has no sign; mirrored throws end mirrored, and a straight drop nowhere else."""
+    model, _ = on_slope(0.0, friction=0.5, velocity=0.0, dissipation=1.0)
+    ends = [dyn.simulate(model, [0.02, 0.0], [0.0, speed], 0.3) for speed in (0.4, -0.4, 0.0)]
+    x = [float(run.q[-1, 1]) for run in ends]
+    assert 0.0 < x[0] < 0.4 * 0.3
+    assert x == approx([x[0], -x[0], 0.0], rel=STEPS, abs=1e-15)
+    assert np.abs([run.qd[-1, 1] for run in ends]).max() < 1e-15
+
+
+def test_sticking_friction_in_space_acts_along_two_tangents() -> None:
+    """The axis of `to` nearest to the plane, and the normal times it."""
+    normal = np.array([0.1, 0.6, 0.7])
+    normal /= np.linalg.norm(normal)
+    first = np.eye(3)[0] - normal[0] * normal
+    lines = [first / np.linalg.norm(first), np.cross(normal, first / np.linalg.norm(first))]
+    model = dyn.Mechanism([ball()], forces=[dyn.Contact("ball", normal=normal, stiffness=1e5, friction=0.4)])
+    slip = 0.3 * lines[0] - 0.1 * lines[1]
+    found = evaluated(model, model.forces[0], [*(-0.01 * normal), 1.0, 0.0, 0.0, 0.0], [*slip, 0.0, 0.0, 0.0])
+    force = float(found["normal"]) * (normal - 0.4 * lines[0] + 0.4 * lines[1])
+    assert [float(found[f"f{axis}"]) for axis in "xyz"] == approx(force.tolist(), rel=SOLVED)
 
 
 def test_the_force_never_pulls_and_friction_stays_below_its_bound() -> None:
@@ -196,6 +242,16 @@ def test_slopes_are_there_at_the_touch_and_apart() -> None:
         assert set(second.evaluate(state).values()) == {0.0}
 
 
+@mark.parametrize("method", ["dop853", "radau"])
+def test_a_motion_from_the_touch_itself_has_slopes(method: str) -> None:
+    model = falling(stiffness=1e5)
+    pushed = replace(model, gravity=(0.0, 0.0, -GRAVITY))
+    found = dyn.gradient(pushed, lambda q, qd, t: q[0], [0.0], [0.0], 0.02, method, wrt=["q"]).gradients["q"][0]
+    exact = {"rtol": 1e-11, "atol": 1e-14}
+    low, high = (float(dyn.simulate(pushed, [sign * 1e-6], [0.0], 0.02, **exact).q[-1, 0]) for sign in (-1.0, 1.0))
+    assert found == approx((high - low) / 2e-6, rel=1e-3)  # the slope has a kink at the touch
+
+
 def test_a_gradient_through_a_landing_is_that_of_differences() -> None:
     """Of where a spinning ball is after its first bounce, by the start and by the material."""
     contact = dyn.Contact("ball", radius=RADIUS, stiffness="k", dissipation="d", friction="mu", velocity="slow")
@@ -268,8 +324,8 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "sticky": ({"friction": math.nan}, "contact of body 'ball' with 'world': friction must be finite and at least 0"),
     "a jump": (
-        {"friction": 0.5},
-        "contact of body 'ball' with 'world': velocity must be positive where there is friction",
+        {"friction": 0.5, "to_radius": 0.1},
+        "contact of body 'ball' with 'world': velocity must be positive where spheres rub",
     ),
     "no value": (
         {"stiffness": "k"},
