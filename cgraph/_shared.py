@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .core.label import SMOOTH as SMOOTH, UNLABELLED as UNLABELLED
     from .core.scope import without_collection as without_collection
     from .explain.lint.lint import Lint as Lint
+    from .explain.reachability import descendants as descendants
     from .explain.why_nan import WhyNan as WhyNan
     from .operations.operation import columns as columns
     from .program.derivatives.jvp import Passes as Passes

@@ -12,7 +12,7 @@ from ..operations.texts import LLVM_ONE_OR_ZERO, LLVM_WHERE
 from .arithmetic import REGISTERS, Arithmetic, bits, words_of
 from .function_writer import FunctionWriter
 from .parts import STEPS, Parts
-from .schedule import Joined, Merged, Scheduled, joined_calls, products_of, schedule
+from .schedule import Joined, Merged, joined_calls, products_of, schedule
 from .vector_math import POLYNOMIAL, helpers
 from .vector_sums import Sums, Vectors, vector_sums
 
@@ -176,8 +176,8 @@ def instructions(
     sums = vector_sums(graph, products) if arithmetic.lanes == 1 else {}  # of one point
     merged = Merged(_joined_calls(graph, arithmetic), products, _of_libm(graph, arithmetic), sums)
     vectors = Vectors(merged.sums)
-    steps = _results_behind_calls(schedule(graph, merged), merged.calls)
-    steps = {step: () if isinstance(step, Sums) else reads for step, reads in steps.items() if step not in merged.sums}
+    order = schedule(graph, merged).items()
+    steps = {step: () if isinstance(step, Sums) else reads for step, reads in order if step not in merged.sums}
     end = Joined((), tuple(ends.values()))
     steps[end] = end.arguments
     parts = Parts(steps, merged.calls, t, 8 * arithmetic.lanes, arithmetic.registers, leaf, vectors)
@@ -303,22 +303,6 @@ def _product_and_sum(node: Node, product: Node, r: str, args: list[str], arithme
         lines.append(f"  {r}.minus = fneg {t} {c if first else a}")
         a, c = (a, f"{r}.minus") if first else (f"{r}.minus", c)
     return [*lines, f"  {r} = call {t} @llvm.fmuladd.{arithmetic.suffix}({t} {a}, {t} {b}, {t} {c})"]
-
-
-def _results_behind_calls(
-    steps: Mapping[Scheduled, tuple[Scheduled, ...]], calls: Mapping[Node, Joined]
-) -> dict[Scheduled, tuple[Scheduled, ...]]:
-    """The steps, the nodes that a joined call gives right behind it."""
-    results: dict[Joined, list[Node]] = {}
-    for node, call in calls.items():
-        results.setdefault(call, []).append(node)
-    order: dict[Scheduled, tuple[Scheduled, ...]] = {}
-    for step, reads in steps.items():
-        if step not in calls:
-            order[step] = reads
-        if isinstance(step, Joined):
-            order |= dict.fromkeys(results[step], (step,))
-    return order
 
 
 def _vector(arithmetic: Arithmetic) -> Arithmetic:

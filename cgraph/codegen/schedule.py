@@ -39,8 +39,12 @@ Scheduled = Node | Joined | Sums
 def schedule(graph: Graph, merged: Merged) -> dict[Scheduled, tuple[Scheduled, ...]]:
     """Every operation once and what it reads, arguments first, in the order in which the nodes were made.
 
-    Calls of library functions come as early as they can, since a call empties the registers.
+    Calls of library functions come as early as they can, since a call empties the registers; right behind a joined one
+    come the nodes that it gives.
     """
+    results: dict[Scheduled, list[Node]] = {}
+    for node, call in merged.calls.items():
+        results.setdefault(call, []).append(node)
     reads: dict[Scheduled, tuple[Scheduled, ...]] = {}
     stack: list[Scheduled] = list(graph.outputs.values())
     while stack:
@@ -59,6 +63,7 @@ def schedule(graph: Graph, merged: Merged) -> dict[Scheduled, tuple[Scheduled, .
             stack += reversed(missing)
             continue
         order.setdefault(stack.pop(), reads[step])
+        order |= {node: (step,) for node in results.get(step, ()) if node not in order}
     return order
 
 

@@ -1,11 +1,10 @@
-"""Numbers at a point: the value of every node, and the local partial derivative of every edge."""
+"""Numbers at a point: the local partial derivative of every edge."""
 
 from collections.abc import Mapping, Sequence
 
 from ..core.checks import GraphError
 from ..core.evaluation import is_finite
 from ..core.graph import Edge, Graph
-from ..core.node import Node
 from ..util.require import require_mapping
 from .names import Names
 
@@ -26,15 +25,9 @@ def checked(names: Names, at: Point) -> dict[str, float]:
     return {name: float(value) for name, value in given.items()}
 
 
-def node_values(names: Names, nodes: Sequence[Node], at: Point) -> list[float]:
-    """The values of nodes of the graph at a point."""
-    if not nodes:
-        return []
-    inputs = names.graph.inputs
-    values = Graph(inputs, {str(i): node for i, node in enumerate(nodes)}).evaluate(checked(names, at))
-    return [float(values[str(i)]) for i in range(len(nodes))]
-
-
 def edge_slopes(names: Names, edges: Sequence[Edge], at: Point) -> list[float]:
     """d target / d source of each edge alone, at a point; NaN or infinite where there is no derivative."""
-    return node_values(names, [edge.partial for edge in edges], at)
+    if not edges:
+        return []
+    partials = {str(i): edge.partial for i, edge in enumerate(edges)}
+    return [float(each) for each in Graph(names.graph.inputs, partials).evaluate(checked(names, at)).values()]

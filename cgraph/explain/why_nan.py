@@ -193,7 +193,7 @@ def _point(names: Names, at: Mapping[str, float]) -> dict[str, float]:
 def _values(graph: Graph, nodes: Sequence[Node], point: Mapping[str, float]) -> list[float]:
     """Values of nodes over the graph's inputs at a point that may be anything."""
     found = Graph(graph.inputs, {str(i): node for i, node in enumerate(nodes)}).evaluate(point)
-    return [float(found[str(i)]) for i in range(len(nodes))]
+    return [float(each) for each in found.values()]
 
 
 def _origin(

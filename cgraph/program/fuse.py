@@ -11,7 +11,6 @@ from ..codegen.schedule import products_of
 from ..core.graph import Graph
 from ..core.node import Node, constant, variable
 from ..core.row import Row
-from ..core.traversal import rebuild
 from ..operations.operation import OPS, columns
 from .program import Program
 from .statement import Statement, row_of
@@ -150,11 +149,3 @@ class _Registers:
             if product is not None:
                 self._products[node] = product
         return self._known[key]
-
-
-def applied(graph: Graph, values: Sequence[Node]) -> list[Node]:
-    """The outputs of a graph at nodes, operation by operation as it has them: nothing is folded."""
-    inputs = dict(zip(graph.inputs, values, strict=True))
-    outputs = list(graph.outputs.values())
-    copies = rebuild(outputs, inputs, lambda node, args: Node(node.op, args, node.label))
-    return [copies[node] for node in outputs]

@@ -13,7 +13,7 @@ from cgraph._shared import Array
 
 from .. import theme
 from ..plots.plot import empty_figure, style, to_gif
-from .surfaces import surfaces
+from .surfaces import grid, surfaces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,8 +135,8 @@ class Sticks(FilmPanel):
             axis.set_xlim(center[0] - self.half, center[0] + self.half)
             axis.set_ylim(center[1] - self.half, center[1] + self.half)
             seen = surfaces(touching, self.radii, center, self.half, step)
-            still = _crossing(center, self.half, step) if self.follows and not seen.grids else seen.grids
-            _put(grids, still)
+            still = grid(np.zeros(2), np.eye(2), center, self.half, step)  # in the world, while the frame goes along
+            _put(grids, still if self.follows and not seen.grids else seen.grids)
             _put(edges, seen.edges)
             _put(balls, [line for sphere in seen.spheres for line in sphere])
             _put(tip, [motion.values[max(0, k - TRACE) : k + 1, count - 1]])
@@ -232,17 +232,6 @@ def _line(axis: Axes, **looks: Any) -> Line2D:
 def _put(artist: Line2D, lines: Sequence[Array]) -> None:
     """Let one artist be several lines, (k, 2) each."""
     artist.set_data(*np.concatenate([BREAK, *[part for line in lines for part in (line, BREAK)]]).T)
-
-
-def _crossing(center: Array, half: float, step: float) -> list[Array]:
-    """Lines that stand still in the world, for a frame that goes with the mechanism."""
-    found = []
-    for axis in (0, 1):
-        for i in range(int(np.ceil((center[axis] - half) / step)), int(np.floor((center[axis] + half) / step)) + 1):
-            ends = np.stack([center - half, center + half])
-            ends[:, axis] = i * step
-            found.append(ends)
-    return found
 
 
 def _nice(length: float) -> float:

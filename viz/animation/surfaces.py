@@ -34,7 +34,7 @@ def surfaces(points: Array, radii: Sequence[float], center: Array, half: float, 
     for origin, *ends in planes.reshape(-1, 3, 2):
         ways = np.array(ends) - origin
         if abs(np.linalg.det(ways)) > EDGE_ON:
-            lines.grids.extend(_grid(origin, ways, center, half, step))
+            lines.grids.extend(grid(origin, ways, center, half, step))
         else:
             way = max(ways, key=np.linalg.norm)
             way = way / (np.linalg.norm(way) or 1.0)
@@ -43,8 +43,8 @@ def surfaces(points: Array, radii: Sequence[float], center: Array, half: float, 
     return lines
 
 
-def _grid(origin: Array, ways: Array, center: Array, half: float, step: float) -> list[Array]:
-    """Lines around the place of a plane that is behind the middle of the picture."""
+def grid(origin: Array, ways: Array, center: Array, half: float, step: float) -> list[Array]:
+    """Lines of a plane, a step of its ways apart, around its place behind the middle of the picture."""
     around = np.round(np.linalg.solve(ways.T, center - origin) / step)
     many = math.ceil(3.0 * half / step)
     shifts, ends = np.arange(-many, many + 1), np.array([-many, many])

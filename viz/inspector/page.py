@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from html import escape
 from string import Template
 
@@ -168,19 +169,10 @@ def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[No
     """The versions to switch among, checked; a graph alone is one."""
     if isinstance(graph, Graph):
         known = remarks_of(graph)
+        version = Version("graph", graph, about or known.words, marked)
         if marked or not known.outputs:
-            return [Version("graph", graph, about or known.words, marked)]
-        return [
-            Version(
-                "graph",
-                graph,
-                about or known.words,
-                known.nodes,
-                blamed=known.edges,
-                flawed=True,
-                off=known.outputs,
-            )
-        ]
+            return [version]
+        return [replace(version, marked=known.nodes, blamed=known.edges, flawed=True, off=known.outputs)]
     given: object = graph
     listed = isinstance(given, Sequence) and not isinstance(given, str)
     if not listed or not all(isinstance(each, Version) for each in graph):

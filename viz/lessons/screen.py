@@ -21,7 +21,7 @@ TOO_LARGE = "The graphs of this system are too large to be computed many times a
 class Figure:
     """A drawing of a graph to be marked, as SVG.
 
-    task: what to mark, on paper.  answer: the sentence on the marks.  blank: what is marked on paper, if it is another.
+    task: what to mark, on paper.  answer: the sentence on the marks.
     """
 
     plain: str
@@ -29,11 +29,10 @@ class Figure:
     caption: str
     task: str
     answer: str
-    blank: str = ""
 
     def html(self, *, marked: bool = False, paper: bool = False) -> str:
         """The picture with its caption, which follows the reader's colors except on paper."""
-        svg = self.marked if marked else (self.blank if paper else "") or self.plain
+        svg = self.marked if marked else self.plain
         caption = self.answer if marked else self.caption
         return Picture("", svg if paper else to_adaptive(svg), caption, None).html()
 

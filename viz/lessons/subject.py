@@ -52,6 +52,7 @@ class Subject:
     qd: Array
     qdd: Array
     names: Mapping[str, str] = field(default_factory=dict)
+    _drawn: dict[str, str] = field(default_factory=dict, init=False)  # SVG of DOT
 
     @property
     def system(self) -> System:
@@ -143,10 +144,6 @@ class Subject:
             {"name": name, "shown": self.with_unit(name), "low": -REACH, "high": REACH, "value": self.values[name]}
             for name in names
         ]
-
-    @cached_property
-    def _drawn(self) -> dict[str, str]:
-        return {}
 
     def svg(self, drawing: Digraph) -> str:
         """A drawing as SVG, made once where it is used more than once."""

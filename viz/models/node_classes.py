@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable
 
 from cgraph import Graph, Node
+from cgraph._shared import descendants
 from cgraph.extend import ADJOINT, TANGENT, topological
 from dynamics.equations.formulations.lagrange_terms import EULER, newton_euler
 from dynamics.equations.formulations.verdict import Verdict
@@ -39,8 +40,8 @@ def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callab
 
     def classes(graph: Graph) -> Callable[[Node], str]:
         wrong = known[graph]
-        adjoint = _users(graph, [node for node in graph.nodes if ADJOINT in node.roles])
-        spoilt = _users(graph, [edge.target for edge in wrong.edges])
+        adjoint = descendants(graph.nodes, [node for node in graph.nodes if ADJOINT in node.roles])
+        spoilt = descendants(graph.nodes, [edge.target for edge in wrong.edges])
 
         def name(node: Node) -> str:
             if node in wrong.nodes:
@@ -76,7 +77,7 @@ def form_classes(graph: Graph) -> Callable[[Node], str]:
     momenta = "p0_dot" in graph.outputs
     inputs = dict(zip(graph.input_names, graph.inputs, strict=True))
     moving, driven = (
-        _users(graph, [node for name, node in inputs.items() if re.fullmatch(rf"{kind}\d+", name)])
+        descendants(graph.nodes, [node for name, node in inputs.items() if re.fullmatch(rf"{kind}\d+", name)])
         for kind in ("p" if momenta else "qd", "tau")
     )
     velocities = set(topological([node for name, node in graph.outputs.items() if momenta and name[0] == "q"]))
@@ -93,12 +94,3 @@ def form_classes(graph: Graph) -> Callable[[Node], str]:
         return ACCELERATIONS if node in driven else BIAS
 
     return name
-
-
-def _users(graph: Graph, nodes: Iterable[Node]) -> set[Node]:
-    """Nodes, and all that depends on them."""
-    reached = set(nodes)
-    for node in graph.nodes:  # arguments come before their use
-        if not reached.isdisjoint(node.args):
-            reached.add(node)
-    return reached

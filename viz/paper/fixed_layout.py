@@ -1,6 +1,7 @@
 """Several graphs of the same quantities on one layout: what they share stays where it is, and each shows its own part."""
 
 import re
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -12,7 +13,7 @@ from cgraph.extend import Names
 
 from .. import theme
 from ..graph_drawing.dot import short_formulas
-from ..graph_drawing.render import Positions, positions
+from ..graph_drawing.render import Size, positions
 from ..theme import Paint
 
 LETTER, LEAF, OPERATION, MARGIN = (
@@ -53,23 +54,6 @@ class Arrow(NamedTuple):
     to_output: bool
 
 
-class Drawn(NamedTuple):
-    """How many shapes and arrows of each kind a drawing has; `wrong` ones are among the others."""
-
-    inputs: int
-    operations: int
-    outputs: int
-    edges: int
-    output_arrows: int
-    wrong_operations: int
-    wrong_edges: int
-
-    @property
-    def nodes(self) -> int:
-        """Inputs and operations: outputs are no nodes."""
-        return self.inputs + self.operations
-
-
 @dataclass(frozen=True)
 class View:
     """One graph as it is drawn: {place: shape} and {(place, place): arrow}, by places that all views share.
@@ -83,19 +67,20 @@ class View:
     wrong: frozenset[Node]
     wrong_edges: frozenset[Edge]
 
-    def drawn(self) -> Drawn:
-        """What the drawing has, counted shape by shape and arrow by arrow."""
-        kinds = [shape.kind for shape in self.shapes.values()]
+    def drawn(self) -> dict[str, int]:
+        """How many shapes and arrows of each kind the drawing has; wrong ones are among the others, outputs no nodes."""
+        kinds = Counter([shape.kind for shape in self.shapes.values()])
         arrows = list(self.arrows.values())
-        return Drawn(
-            inputs=kinds.count(INPUT),
-            operations=kinds.count(NODE),
-            outputs=kinds.count(OUTPUT),
-            edges=sum([not arrow.to_output for arrow in arrows]),
-            output_arrows=sum([arrow.to_output for arrow in arrows]),
-            wrong_operations=sum([shape.paint == theme.MARKED for shape in self.shapes.values()]),
-            wrong_edges=sum([arrow.wrong and not arrow.to_output for arrow in arrows]),
-        )
+        return {
+            "nodes": kinds[INPUT] + kinds[NODE],
+            "inputs": kinds[INPUT],
+            "operations": kinds[NODE],
+            "outputs": kinds[OUTPUT],
+            "edges": sum([not arrow.to_output for arrow in arrows]),
+            "output_arrows": sum([arrow.to_output for arrow in arrows]),
+            "wrong_operations": sum([shape.paint == theme.MARKED for shape in self.shapes.values()]),
+            "wrong_edges": sum([arrow.wrong and not arrow.to_output for arrow in arrows]),
+        }
 
     def inputs_of_mistakes(self) -> list[str]:
         """The texts of inputs all of whose arrows are wrong."""
@@ -151,31 +136,25 @@ def stage_svg(views: Mapping[str, View], shown: str) -> str:
 
     An element that looks the same in several views is one, with their names in `data-views`.
     """
-    at = _layout(list(views.values()))
+    centers, paths, size = _layout(list(views.values()))
     lines: dict[str, list[str]] = {}
     boxes: dict[str, list[str]] = {}
     for name, view in views.items():
         for (source, target), arrow in view.arrows.items():
-            middle = at.centers[target], view.shapes[target].size
-            lines.setdefault(_arrow(at.lines[source, target], arrow, middle), []).append(name)
+            middle = centers[target], view.shapes[target].size
+            lines.setdefault(_arrow(paths[source, target], arrow, middle), []).append(name)
         for place, shape in view.shapes.items():
-            boxes.setdefault(_box(place, shape, at.centers[place]), []).append(name)
+            boxes.setdefault(_box(place, shape, centers[place]), []).append(name)
     parts = [_in_views(inside, names, shown) for group in (lines, boxes) for inside, names in group.items()]
-    width, height = at.size[0] + 2 * MARGIN, at.size[1]
+    width, height = size[0] + 2 * MARGIN, size[1]
     return (
         f'<svg viewBox="{-MARGIN:.0f} 0 {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}" '
         f'font-family="{theme.FONT_FAMILIES}" font-size="{FONT}" text-anchor="middle">{"".join(parts)}</svg>'
     )
 
 
-class _Layout(NamedTuple):
-    centers: Mapping[str, tuple[float, float]]
-    lines: Mapping[tuple[str, str], str]
-    size: tuple[float, float]
-
-
-def _layout(views: Sequence[View]) -> _Layout:
-    """Where the places of all views are, as wide and high as the largest shape at each."""
+def _layout(views: Sequence[View]) -> tuple[dict[str, Size], dict[tuple[str, str], str], Size]:
+    """Centers of the places of all views, each as large as its largest shape; lines between them; the size of all."""
     sizes: dict[str, tuple[float, float]] = {}
     for view in views:
         for place, shape in view.shapes.items():
@@ -183,9 +162,9 @@ def _layout(views: Sequence[View]) -> _Layout:
             sizes[place] = max(wide, shape.size[0]), max(high, shape.size[1])
     number = {place: i for i, place in enumerate(sizes)}
     pairs = list(dict.fromkeys([pair for view in views for pair in view.arrows]))
-    found: Positions = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])[0]
+    found = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])[0]
     centers = {place: found.centers[i] for place, i in number.items()}
-    return _Layout(centers, {(a, b): found.lines[number[a], number[b]] for a, b in pairs}, found.size)
+    return centers, {(a, b): found.lines[number[a], number[b]] for a, b in pairs}, found.size
 
 
 def _in_views(inside: str, names: Sequence[str], shown: str) -> str:

@@ -25,7 +25,6 @@ from ...util.caches import made_once
 from ...util.memory import aligned
 from ...util.threads import write_batch
 from ...util.words import listed
-from ..fuse import applied
 from ..program import Program
 from ..runners.native_runner import NativeRunner
 from ..runners.python_runner import PythonRunner
@@ -160,8 +159,7 @@ class DirectionProducts:
         """Runner of a point and one direction, as one register, for many of these side by side."""
         primal, linear = self._derivative.split
         seeds = linear.inputs[len(primal.outputs) :]
-        outputs = applied(linear, [*applied(primal, primal.inputs), *seeds])
-        whole = Graph([*primal.inputs, *seeds], {f"{k}": node for k, node in enumerate(outputs)})
+        whole = Graph([*primal.inputs, *seeds], linear(*primal.outputs.values(), *seeds))
         registers = {"x": len(whole.inputs), "y": len(whole.outputs)}
         return self._ready(Program(registers, [Call(whole, ("x",), ("y",))], ["y"]))
 

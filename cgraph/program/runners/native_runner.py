@@ -74,12 +74,6 @@ class NativeRunner(Runner):
         return batch_code
 
     @cached_property
-    def masked(self) -> Program:
-        """The program of memories side by side, see `many`."""
-        program: Program = self._side.many_keeping(self.program, self.program.registers)
-        return program
-
-    @cached_property
     def _fused_many(self) -> Program:
         return self._fused if self.masked is self.program else fused(self.masked)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import numpy as np
 from ...codegen.python_function import OnArrays, OnFloats
 from ...core.evaluation import Array
 from ...core.graph import Graph
-from ..many import many
 from ..program import Program, whole_graph
 from ..statement import Execution
 from ..statements.call import spread
@@ -40,11 +38,6 @@ class PythonRunner(Runner):
         self._execution = Execution(program.registers, self._at, self._batch)
         self._functions: dict[int, OnFloats] = {}
         self._arrays: dict[int, OnArrays] = {}
-
-    @cached_property
-    def masked(self) -> Program:
-        """The program of memories side by side, see `many`."""
-        return many(self.program)
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         program, execution = self.program, self._execution

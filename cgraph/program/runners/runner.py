@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
 from ...util.memory import require_memory
 from ...util.require import require_mapping, require_whole
+from ..many import many
 from ..program import Program
 from ..writer import offsets
 
@@ -60,10 +62,10 @@ class Runner(ABC):
         self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
         self.size = places[""]
 
-    @property
-    @abstractmethod
+    @cached_property
     def masked(self) -> Program:
         """The program of memories side by side, see `many`."""
+        return many(self.program)
 
     def memory(self, values: Mapping[str, ArrayLike], count: int | None = None) -> Array:
         """A memory, (size,) or (size, count), with these values of registers, 0 elsewhere.

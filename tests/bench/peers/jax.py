@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.autodiff.ldl_solve import ldl_elimination
 from tests.bench.peers.peer import DERIVATIVES, MOTIONS, NUDGE, PASSES, Peer, PeerModel, TimedTask, required, rk4_step
 from tests.bench.peers.translate import lagrangian, quasi_velocities
+from tests.ldl import ldl_elimination
 
 if TYPE_CHECKING:
     from jax import Array as JaxArray

@@ -10,7 +10,6 @@ import numpy as np
 
 import cgraph as cg
 from cgraph._shared import Array
-from cgraph.autodiff.ldl_solve import ldl_elimination
 from dynamics.equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from dynamics.equations.linearization.linearize_many import linearize_many
 from dynamics.experiments.timing import Made, spent
@@ -20,6 +19,7 @@ from dynamics.multiprecision.graph_values import values_in_digits
 from dynamics.systems.model import as_system
 from tests.bench.tables import Table, digits
 from tests.bench.timing import relative_difference, run_fresh
+from tests.ldl import ldl_elimination
 from viz.paper.mechanisms import turned_arm
 
 COMPILED = (10, 30, 100)  # links of the chains of `compile_time`

@@ -13,13 +13,14 @@ import cgraph as cg
 from cgraph import GraphError
 from cgraph.autodiff.hessian_solve import solve_nodes, solve_tangents
 from cgraph.autodiff.jacobian import hessian_nodes
-from cgraph.autodiff.ldl_solve import ldl_elimination, ldl_solve
+from cgraph.autodiff.ldl_solve import ldl_solve
 from cgraph.autodiff.rotation_pairs import rotations
 from cgraph.autodiff.symmetric_elimination import SingularError
 from cgraph.core.forward import tangents
 from cgraph.core.traversal import topological
 from tests.cgraph.engines import ENGINES
 from tests.each_row import each_row
+from tests.ldl import ldl_elimination
 from tests.tolerances import LONG_SUM
 
 # Each function runs on nodes and, with mpmath's functions, on high-precision numbers: {name: (function, inputs)}.
