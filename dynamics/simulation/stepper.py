@@ -36,7 +36,7 @@ CROSSED_BLOCK, LONGEST_BLOCK = 64, 4096  # equal steps between two looks for cro
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 COUNTED = "steps", "rejected", "evaluations", "jacobians", "factorizations"
-END, GOAL, FIRST = [f"{START}{name}" for name in ("t_end", "goal", "first")]  # registers
+END, GOAL, FIRST, WISH = [f"{START}{name}" for name in ("t_end", "goal", "first", "wish")]  # registers
 
 
 class StoppedError(Exception):
@@ -61,7 +61,7 @@ class Stepper(ABC):
     every_step: bool = False  # whether all are in blocks, also where rows and checks need the last of a block alone
 
     def __post_init__(self) -> None:
-        self._passes, self._given, self._first = FIRST_PASSES, list(self.parameters), 0.0
+        self._passes, self._given, self._wish = FIRST_PASSES, list(self.parameters), 0.0
         self._plain, self._pending = self.compiled, list[tuple[int, float, Array, float]]()
         self._load(self.compiled)
         if self.control is None:
@@ -87,7 +87,7 @@ class Stepper(ABC):
         """Forget the run before."""
         self.steps = self.rejected = self.evaluations = self.jacobians = self.factorizations = self.resets = 0
         self._before = dict.fromkeys(COUNTED, 0)  # the last reset
-        self._first = 0.0
+        self._wish = 0.0
         self.largest, self.warnings, self._is_stiff, self._is_told = 0.0, list[str](), False, False
         self._is_unsure = False
         self.status = self.event = ""
@@ -137,7 +137,7 @@ class Stepper(ABC):
         self._enter_modes()
         self._numbers[:], self.status = self._zero, self.modes.failed
         self.x[:] = x
-        self._first = abs(h)
+        self._wish = abs(h)
         self._begin(t, t_end)
         if (name := f"{START}so_far") in self.runner.program.registers:
             self.runner.write(self._memory, name, sizes)
@@ -198,7 +198,7 @@ class Stepper(ABC):
             yield StepBlock(at, x[None], at, np.zeros(1), before[None], np.zeros((1, 1, len(x))))
             if self.event or t == span.t_end:
                 return
-            self._before, self._first = {name: getattr(self, name) for name in COUNTED}, 0.0
+            self._before, self._wish = {name: getattr(self, name) for name in COUNTED}, 0.0
             self.begin(x, t, span.t_end)
 
     def _up_to_crossing(self, block: StepBlock, t_end: float) -> tuple[list[StepBlock], Crossing | None]:
@@ -446,8 +446,8 @@ class ChosenStepper(Stepper):
             self._flat = FlatPosition(self.program, t0, self.x, self.parameters)
 
     def _recorded(self, span: Span, looked: bool) -> Iterator[StepBlock]:
-        if self.resets or self._first:
-            self._set(**{FIRST: self._first})
+        if self.resets or self._wish:
+            self._set(**{FIRST: 0.0, WISH: self._wish})
         most = max(1.0, self.options.max_steps - self._before["steps"] - self._before["rejected"])
         while True:
             left = most - self._number("trials")

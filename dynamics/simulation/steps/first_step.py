@@ -25,8 +25,8 @@ from ...integrators.step_control import COLLAPSE, RESOLUTION, SMALLEST_ATOL, reg
 from .state_sizes import OTHERS, StateKinds
 
 START = "start."  # before the names of its own registers, so that no method has to keep clear of them
-# Those that a run writes: its end, where its steps end first, rtol, limit, first step or 0.
-GIVEN = "t_end goal relative longest_step first begins".split()
+# Those that a run writes: its end, where its steps end first, rtol, limit, first step, that which is tried first.
+GIVEN = "t_end goal relative longest_step first wish begins".split()
 TOLERANCE = f"{START}tolerance"  # the register of atol
 LEAP = 1e-2  # of the whole run: the first step that is tried
 TRIALS = 60.0  # of a first step
@@ -122,10 +122,10 @@ def _at_rest(kinds: StateKinds) -> list[Statement]:
 
 
 @call
-def begin(t: Node, t_end: Node, first: Node, longest_step: Node) -> Values:
+def begin(t: Node, t_end: Node, first: Node, wish: Node, longest_step: Node) -> Values:
     """What a run begins with."""
     length = abs(t_end - t)
-    h_first = LEAP * cg.minimum(length, longest_step)
+    h_first = cg.where(wish, cg.minimum(wish, length), LEAP * cg.minimum(length, longest_step))
     return {
         "t0": t,
         "length": length,

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.autodiff.ldl_solve import ldl_elimination
 from tests.bench.peers.peer import Peer, PeerModel, TimedTask, UnavailableError, required
 from tests.bench.peers.translate import lagrangian
+from tests.ldl import ldl_elimination
 
 if TYPE_CHECKING:
     from heyoka import expression
