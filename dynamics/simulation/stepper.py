@@ -18,7 +18,7 @@ from cgraph._shared import Array
 from ..integrators import Problem
 from ..integrators.step_control import CROSSED, DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from .applied_force import Hold
-from .events.crossing_search import Crossing
+from .events.crossing_search import Crossing, outputs_of
 from .events.event import EventProgram
 from .events.event_log import EventLog
 from .events.modes import Modes
@@ -111,13 +111,13 @@ class Stepper(ABC):
                 self._given = self._controlled(self.control.at(t0, x))
             self.modes.direction = math.copysign(1.0, t_end - t0)
             self.modes.begin(t0, x, self._given)
-            self._enter_modes()
+            x = self._enter_modes(t0, x)
         self._numbers[:], self.status = self._zero, "" if self.modes is None else self.modes.failed
         self.x[:] = x
         self._begin(t0, t_end)
 
-    def _enter_modes(self) -> None:
-        """Take the steps of the problem that the modes are of, and their values."""
+    def _enter_modes(self, t: float, x: Array) -> Array:
+        """Take the steps of the problem that the modes are of, and their values; the state, on what it slides on."""
         assert self.modes is not None
         compiled, problem, options = self._plain, self.modes.problem, self.options
         if problem is not self.modes.plain:
@@ -126,6 +126,8 @@ class Stepper(ABC):
         if compiled is not self.compiled:
             self._load(compiled)
         self.set_parameters(self._given)
+        onto = problem.projection if problem.slides else None
+        return x if onto is None else outputs_of(onto, np.append(x, t)[:, None], np.array(self.parameters))[:, 0]
 
     def _turn(self, t_end: float) -> None:
         """Go on where a surface is crossed, at the end of a block, with a step as long as the one that ends there."""
@@ -134,7 +136,7 @@ class Stepper(ABC):
         sizes = self.modes.sizes
         self._before = {name: getattr(self, name) for name in COUNTED}
         self.modes.turn(t, x, self._given, number)
-        self._enter_modes()
+        x = self._enter_modes(t, x)
         self._numbers[:], self.status = self._zero, self.modes.failed
         self.x[:] = x
         self._wish = abs(h)
@@ -214,8 +216,8 @@ class Stepper(ABC):
         for part in parts:
             crossing, is_sure = self.modes.first_crossing(part, self._given)
             if not (is_sure or self._is_unsure):
-                self._is_unsure, first = True, f"surfaces may be crossed unseen, first after t = {part.t_old[0]:.6g} s"
-                self.warnings.append(f"{first}: take a shorter dt or max_step")
+                self._is_unsure, when = True, f"first after t = {part.t_old[0]:.6g} s"
+                self.warnings.append(f"surfaces may be crossed unseen, {when}: take a shorter dt or max_step")
             if crossing is not None:
                 row, at = crossing.row, (np.array([crossing.row]), np.array([crossing.s]))
                 t, x = float(part.times_at(*at)[0]), part.states_at(*at)[0]

@@ -294,9 +294,8 @@ class Task:
                 modes = None if self._switched is None else Modes(self._switched)
                 run = stepper(compiled, self.options, p, stopped=stopped, events=self.events, modes=modes)
             run.set_parameters(p)
-            if (
-                has_end and isinstance(run, ChosenStepper) and run.log is run.modes
-            ):  # both None: steps need not be looked at
+            is_plain = run.log is None and run.modes is None  # steps need not be looked at
+            if has_end and isinstance(run, ChosenStepper) and is_plain:
                 if run.unseen(x, self.span):
                     part.reached(k, steps=run.steps, rejected=run.rejected, nfev=run.evaluations, dt=run.largest)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x

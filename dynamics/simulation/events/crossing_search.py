@@ -22,6 +22,7 @@ from cgraph.extend import enclosure
 
 from ...integrators.problem import reaches
 from ..steps.dense_output import UNIT, Indices, StepBlock
+from ..steps.state_sizes import Flags
 
 MOST_CELLS = 4096  # that wait at once
 SHORTEST = 2.0**-50  # of a step, a cell
@@ -180,9 +181,9 @@ def _first_zero(
     found: tuple[int, float] | None = None
     while len(rows):
         begins, ends = np.split(_values(one, p, block, np.tile(rows, 2), np.concatenate([a, b]))[0], 2)
-        clear, goes_one_way = told_by_slopes(one, p, block, Cells(rows, a, b), begins, ends)
+        clear, goes_one_way, _ = told_by_slopes(one, p, block, (rows, a, b), begins, ends)
         told = clear | goes_one_way | (b - a <= SHORTEST)
-        passes = np.flatnonzero(told & ~clear & ((begins < 0.0) | (ends < 0.0)))
+        passes = np.flatnonzero(told & ((begins < 0.0) | (ends < 0.0)))
         for k in passes[np.lexsort((a[passes], rows[passes]))].tolist():
             row, at = int(rows[k]), float(a[k])
             if best is not None and (row, at) >= best:
@@ -201,35 +202,23 @@ def _first_zero(
     return found, True
 
 
-class Cells(NamedTuple):
-    """Parts of steps, from share a to share b, (n,) each."""
-
-    rows: Indices
-    a: Array
-    b: Array
-
-
 def told_by_slopes(
-    one: Quantities, p: Array, block: StepBlock, cells: Cells, begins: Array, ends: Array
-) -> tuple[Array, Array]:
-    """Of one quantity, with values at both ends of cells, whether it is positive there, and whether it goes one way."""
+    one: Quantities, p: Array, block: StepBlock, cells: tuple[Indices, Array, Array], begins: Array, ends: Array
+) -> tuple[Flags, Flags, Flags]:
+    """Of a quantity, with values at both ends of cells: whether it keeps its sign, goes one way, and is bounded.
+
+    cells: steps, and shares a and b between which parts of them lie, (n,) each.
+    """
     down, up = _slope_bounds(one, p, block, *cells)
+    turned, width = begins < 0.0, cells[2] - cells[1]
+    one_way, bounded = (down >= 0.0) | (up <= 0.0), np.isfinite(up - down)
+    least, most = np.where(turned, -up, down), np.where(turned, -down, up)
+    begins, ends = np.abs(begins), np.where(turned, -ends, ends)
     with np.errstate(all="ignore"):
-        # it lies above the lines of the least slope from the left and the largest from the right, which meet here
-        least = (begins * up - ends * down + up * down * (cells.b - cells.a)) / (up - down)
-    one_way = np.isfinite(up - down) & ((down >= 0.0) | (up <= 0.0))
-    return (np.where(one_way, np.minimum(begins, ends), least) > 0.0) & np.isfinite(up - down), one_way
-
-
-def told_by_bounds(
-    one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
-) -> tuple[Array, Array, Array]:
-    """Of one quantity and cells, (n,), whether it is clear of zero, goes one way, and is bounded, as not at a pole."""
-    low, high = [each[0] for each in _bounds(one, p, block, rows, a, b)]
-    down, up = _slope_bounds(one, p, block, rows, a, b)
-    clear = (low > 0.0) | (high < 0.0)
-    is_bounded = np.isfinite(high - low)
-    return clear, is_bounded & ((down >= 0.0) | (up <= 0.0)), is_bounded
+        # its size lies above the lines of the least slope from the left and the largest from the right, which meet here
+        meet = (begins * most - ends * least + most * least * width) / (most - least)
+    clear = bounded & (np.where(one_way, np.minimum(begins, ends), meet) > 0.0)
+    return clear, one_way & bounded, bounded
 
 
 def _left_at(one: Quantities, p: Array, block: StepBlock, rounding: float) -> float:

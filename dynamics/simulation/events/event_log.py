@@ -16,7 +16,7 @@ from ...integrators.step_control import RESOLUTION
 from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags
-from .crossing_search import quantities, told_by_bounds
+from .crossing_search import quantities, told_by_slopes
 from .event import EventProgram, WatchedEvent, numbers_of
 
 MOST_CELLS = 1024  # of a step
@@ -113,16 +113,18 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
     """Cells of all steps in order, in which a quantity is not zero or goes one way, but for rounding; and for which
     steps, (steps,), `MOST_CELLS` were too few.
     """
-    count, watched, p = len(steps.block.t), quantities(steps.event.values, steps.block.x.shape[1]), steps.parameters
-    rows = np.arange(count)
-    ends = [of(rows, s) for of in (steps.values, steps.slopes) for s in (np.zeros(count), np.ones(count))]
-    cells = Cells(
-        rows, np.zeros(count), np.ones(count), *ends, np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    count, p = len(steps.block.t), np.array(steps.parameters)
+    watched, rows, none = (
+        quantities(steps.event.values, steps.block.x.shape[1]),
+        np.arange(count),
+        np.zeros(count, bool),
     )
-    done, beyond, new = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
+    g_a, g_b, slope_a, slope_b = [of(rows, none + s) for of in (steps.values, steps.slopes) for s in (0.0, 1.0)]
+    cells = Cells(rows, none + 0.0, none + 1.0, g_a, g_b, slope_a, slope_b, none, none.copy())
+    done, beyond, new = none.copy(), none.copy(), ~none
     while True:
         fresh = cells.take(new)
-        clear, goes_one_way, bounded = told_by_bounds(watched, np.array(p), steps.block, fresh.rows, fresh.a, fresh.b)
+        clear, goes_one_way, bounded = told_by_slopes(watched, p, steps.block, fresh[:3], fresh.g_a, fresh.g_b)
         size = np.maximum(np.abs(fresh.g_a), np.abs(fresh.g_b))
         told = clear | goes_one_way | (bounded & (size <= 2.0 * steps.rounding(fresh.rows, fresh.b)))
         nothing = np.isnan(fresh.g_a) & np.isnan(fresh.g_b)

@@ -17,7 +17,8 @@ from cgraph.extend import Builder, tangents
 from ...integrators import Problem
 from ...integrators.rate_in_modes import sliding
 from ...integrators.switches import Switches
-from ..steps.dense_output import UNIT, StepBlock
+from ..steps.dense_output import UNIT, Indices, StepBlock
+from ..steps.state_sizes import Flags
 from .crossing_search import Crossing, Quantities, first_crossing, outputs_of, quantities, steps_near_zero
 from .event import rounding_errors
 
@@ -75,11 +76,11 @@ class Modes:
         self._at = (np.nan, 0)  # the instant of the last turn, and how many there were at it
 
     @property
-    def slid(self) -> Array:
+    def slid(self) -> Flags:
         """Whether the motion slides on each surface."""
         return self._slid(self.values)
 
-    def _slid(self, modes: Sequence[float] | Array) -> Array:
+    def _slid(self, modes: Sequence[float] | Array) -> Flags:
         halves = (np.array(modes) - 1.0) / self._spacing
         return np.asarray(halves != np.floor(halves))
 
@@ -219,7 +220,7 @@ class _Choice:
         t: float,
         x: Array,
         p: Sequence[float],
-        among: Array,
+        among: Indices,
         middle: Array,
         half: Array,
         crossed: Array,
@@ -272,7 +273,7 @@ class _Choice:
         return self._known[key]
 
     @cached_property
-    def _rests(self) -> Array:
+    def _rests(self) -> Flags:
         """Whether each gap rests on both sides of all surfaces."""
         n = len(self._among)
         found = [self._drifts([side] * n) for side in (-1, 1)]
@@ -288,7 +289,7 @@ class _Choice:
 
     def _second(self, sides: Sequence[int]) -> Array:
         point = self._of._point(self._t, self._x, self._p, self._modes_at(sides)[:, None])
-        return outputs_of(_drift(self._of.plain, 2), point)[self._among, 0]
+        return np.asarray(outputs_of(_drift(self._of.plain, 2), point)[self._among, 0])
 
     def _wrong(self, sides: Sequence[int]) -> list[tuple[int, int]]:
         """Surfaces that do not let the motion go on with these sides, and where they send it."""

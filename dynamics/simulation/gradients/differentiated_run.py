@@ -185,7 +185,7 @@ class DifferentiatedRun:
 
     def cotangents(self, bars: Array) -> tuple[Array, Array]:
         """Cotangents (m + 1 + .., N) of start, t and inputs, from those of the end; and rows of forces of each step."""
-        m, later, rows = len(self.x), 0.0, np.empty(0)
+        m, rows = len(self.x), np.empty((0, 0, 0))
         last, forces = self.segments[-1], self.motions.equations.forces
         total = np.zeros_like(self.motions.tau) if self.motions.each_step else None
         for graph, x in zip(reversed(self.motions.after), reversed(self._before_end), strict=True):
@@ -205,7 +205,8 @@ class DifferentiatedRun:
                 self._require_solved(failed)
             t_bar = vectors.get("t", np.zeros((1, motions.many)))
             if total is not None and rows.size:
-                np.add.at(total, slice(None) if steps.rows is None else steps.rows, rows[:, rows.shape[1] - forces :])
+                places = np.arange(len(total)) if steps.rows is None else steps.rows
+                np.add.at(total, places, rows[:, rows.shape[1] - forces :])
             if k:
                 # cotangents of the instants and lengths of the steps, to which the event adds at the last
                 t, h = rows[:, :2, 0].T.copy()
@@ -259,11 +260,11 @@ class DifferentiatedRun:
         if motions.after:
             parts.append((self.t[-1:], self.x.T, dots[m : m + 1], dots[None, :m]))
         t, x, t_dot, x_dot = (np.concatenate(column) for column in zip(*parts, strict=True))
-        if (graph := motions.equations.end) is not None:
+        if (end_graph := motions.equations.end) is not None:
             points = [*x.T[:, :, None], t[:, None], *motions.inputs[:, :, None]]
             moving = [*points, *x_dot.swapaxes(0, 1), t_dot, *dots[m + 1 :]]
-            x = values_of(graph, points, len(t), 1)[:, :, 0].T
-            x_dot = values_of(_tangent(graph), moving, *t_dot.shape).swapaxes(0, 1)
+            x = values_of(end_graph, points, len(t), 1)[:, :, 0].T
+            x_dot = values_of(_tangent(end_graph), moving, *t_dot.shape).swapaxes(0, 1)
         return t, x, t_dot, x_dot
 
     def _along(self, segment: Segment, dots: Array, lengths: Array) -> tuple[Array, Array]:
