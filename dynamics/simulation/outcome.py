@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from cgraph._shared import Array, real_number
 
 from ..integrators import Problem
-from .estimates.error_estimate import RunEstimate
+from .error_estimate import RunEstimate
 from .events.event import EventProgram
 from .events.event_log import Happening
 from .run_options import SMALL_MEMORY, TABLES, Span, room

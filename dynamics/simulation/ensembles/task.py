@@ -21,7 +21,7 @@ from cgraph.extend import Call, FixedPoint, While, runner
 
 from ...integrators import Problem
 from ...integrators.step_control import DONE
-from ..estimates.error_estimate import ASIDE, RunsBeside, Watch, error_estimates, phases, runs_beside
+from ..error_estimate import ASIDE, RunsBeside, Watch, error_estimates, phases, runs_beside
 from ..events.event import EventProgram
 from ..events.modes import Modes
 from ..outcome import INTERRUPTED, outcome

@@ -9,7 +9,7 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..estimates.error_estimate import LAWLESS
+from ..error_estimate import LAWLESS
 from ..outcome import MotionError, unreached_momenta
 from ..steps.state_sizes import off_by, state_kinds
 from .differentiated_run import DifferentiatedRun

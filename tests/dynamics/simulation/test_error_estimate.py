@@ -13,7 +13,7 @@ from pytest import approx, mark, raises, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
-from dynamics.simulation.estimates.error_estimate import runs_beside
+from dynamics.simulation.error_estimate import runs_beside
 from dynamics.simulation.steps.equal_steps import equal_steps, sampled_numbers
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import LIKE_OTHERS

@@ -18,11 +18,11 @@ import numpy as np
 from cgraph import Graph
 from cgraph._shared import Array, kept_by_first
 
-from ...systems.arguments import TIME
-from ..run_options import Span, Steps
-from ..stepper import EqualStepper, Stepper
-from ..steps.dense_output import StepBlock
-from ..steps.equal_steps import (
+from ..systems.arguments import TIME
+from .run_options import Span, Steps
+from .stepper import EqualStepper, Stepper
+from .steps.dense_output import StepBlock
+from .steps.equal_steps import (
     SAME_INSTANT,
     EqualSteps,
     Numbers,
@@ -31,9 +31,9 @@ from ..steps.equal_steps import (
     longer_steps,
     sampled_numbers,
 )
-from ..steps.row_values import values_of
-from ..steps.state_sizes import off_by
-from ..steps.step_program import StepProgram
+from .steps.row_values import values_of
+from .steps.state_sizes import off_by
+from .steps.step_program import StepProgram
 
 APART_RATIO = 1.5  # the ratio of errors from which a difference of two runs tells them
 LEAST_RATIO = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
