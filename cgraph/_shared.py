@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .core.scope import without_collection as without_collection
     from .explain.lint.lint import Lint as Lint
     from .explain.why_nan import WhyNan as WhyNan
+    from .operations.bounds import intervals as intervals
     from .operations.operation import columns as columns
     from .program.derivatives.jvp import Passes as Passes
     from .program.derivatives.transpose import (
