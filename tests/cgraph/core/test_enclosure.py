@@ -28,8 +28,7 @@ def check(graph: cg.Graph, low: np.ndarray, high: np.ndarray, points: np.ndarray
     """
     least, most = np.vsplit(cg.compile(enclosure(graph), "numpy").batch(np.vstack([low, high])), 2)
     for k in range(0, low.shape[1], 20):  # the rules on floats are the same
-        box = dict(zip(graph.input_names, zip(low[:, k], high[:, k], strict=True), strict=True))
-        found = intervals(graph.nodes, box)
+        found = intervals(graph.nodes, dict(zip(graph.input_names, np.stack([low, high], axis=-1)[:, k], strict=True)))
         least[:, k], most[:, k] = np.transpose([found[node] for node in graph.outputs.values()])
     assert not np.isnan([least, most]).any()
     run = cg.compile(cg.Graph(graph.inputs, {str(i): each for i, each in enumerate(graph.nodes)}), "numpy").batch

@@ -231,6 +231,7 @@ POINTS = (
     (cg.log1p(x), (-1.0, 1.0), "value and slope are infinite at -1"),
     (cg.tan(x), (1.5, 1.6), "infinite at odd multiples of pi/2"),
     (cg.tan(x), (-1.5, 1.5), None),
+    (cg.tan(cg.atan(x)), (0.0, 1e20), "infinite at odd multiples of pi/2"),  # but for rounding
     (cg.asin(x), (0.0, 1.0), "the slope is infinite at -1 and 1"),
     (cg.acos(x), (0.0, 2.0), "there is no value beyond -1 and 1"),
     (cg.asin(x), (-0.9, 0.9), None),
