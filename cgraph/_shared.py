@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .explain.lint.lint import Lint as Lint
     from .explain.reachability import descendants as descendants
     from .explain.why_nan import WhyNan as WhyNan
+    from .operations.bounds import intervals as intervals
     from .operations.operation import columns as columns
     from .program.derivatives.jvp import Passes as Passes
     from .program.derivatives.transpose import (

@@ -1,289 +1,238 @@
-"""Interval arithmetic of the operations: bounds of a value, and in words where a slope has none.
+"""Interval rules of the operations, over numbers and over nodes alike; and in words where a slope is unbounded.
 
-Bounds are outward: they hold for real numbers, and for float64 whose library functions err by ULPS at most.
+Bounds hold but for rounding. A bound that is NaN, as inf - inf, is one that is not known.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial, reduce
+from typing import Any, NamedTuple
 
-from .operation import OPS, Interval, Op
+from ..core.node import Node, apply
+from .operation import OPS, Interval, columns
 
 REAL_LINE: Interval = (-math.inf, math.inf)
-FLAG: Interval = (0.0, 1.0)
-ULPS = 4  # C libraries in use stay within 2 (glibc manual, "Known Maximum Errors"); the vector ones of NumPy within 4
-_MAX_ANGLE = 2.0**20  # beyond, sine and cosine are taken for anything in [-1, 1]: the period's rounding would matter
-_MAX_FLOAT = math.nextafter(math.inf, 0.0)
-_SLACK = 1e-9  # by which an extremum of sine or cosine may lie outside an interval and is counted as inside
+Ends = tuple[Any, Any]  # numbers or nodes
 
 
-def value_of(op: Op, arguments: Sequence[Interval], *, same: bool = False) -> Interval:
-    """The interval of an operation's value; `same`: its two arguments are one node."""
-    if op.interval is None:
-        return REAL_LINE
-    if same and op.interval_of_same is not None:
-        return op.interval_of_same(arguments[0])
-    return op.interval(*arguments)
+class Bounded(NamedTuple):
+    """Bounds of a value, numbers or nodes. known: numbers between which both lie for every box."""
+
+    low: Any
+    high: Any
+    known: Interval
 
 
-# Rounding outwards. A bound that is infinite by overflow alone becomes the largest number on the inner side.
+@dataclass(frozen=True)
+class Rule:
+    """The interval of an operation: of pairs of floats when called, of numbers or nodes by `ends`."""
+
+    ends: Callable[..., Any]  # of Bounded
+
+    def __call__(self, *arguments: Interval) -> Interval:
+        """Bounds of the value, infinite where they are not known."""
+        boxes = [(float(low), float(high)) for low, high in arguments]
+        low, high = self.ends(*[Bounded(*box, box) for box in boxes])
+        return (low + 0.0 if low == low else -math.inf), (high + 0.0 if high == high else math.inf)  # zero has no sign
 
 
-def _down(x: float, ulps: int = 1) -> float:
-    return min(x - ulps * math.ulp(x), _MAX_FLOAT) if x != -math.inf and x != math.inf else min(x, _MAX_FLOAT)
+def intervals(nodes: Iterable[Node], box: Mapping[str, Interval]) -> dict[Node, Interval]:
+    """Bounds of nodes, arguments first, for variables in the box; one that it leaves out is any number.
+
+    They hold but for rounding, and may be wide: an interval forgets which values belong together.
+    """
+    found: dict[Node, Interval] = {}
+    for node in nodes:
+        if node.args:
+            rule, args = rule_of(node)
+            found[node] = rule(*[found[arg] for arg in args])
+        else:
+            found[node] = box.get(str(node.name), REAL_LINE) if node.value is None else (node.value, node.value)
+    return found
 
 
-def _up(x: float, ulps: int = 1) -> float:
-    return -_down(-x, ulps)
+def rule_of(node: Node) -> tuple[Callable[..., Interval], Sequence[Node]]:
+    """The interval of an operation's node, and the arguments that it takes: one if both are one node."""
+    op = columns(node.op)
+    if op.interval_of_same is not None and node.args[0] is node.args[1]:
+        return op.interval_of_same, node.args[:1]
+    return op.interval or _unknown, node.args
 
 
-def _end(name: str, x: float, outwards: Callable[[float, int], float], ulps: int) -> float:
-    """The operation's value at an end of an interval, rounded outwards; one that is zero at zero is so exactly."""
-    y = OPS[name].scalar(x)
-    return y if x == 0.0 == y else outwards(y, ulps)
+def _unknown(*_: Interval) -> Interval:
+    return REAL_LINE
 
 
-def _sum(a: float, b: float, outwards: Callable[[float], float], anything: float) -> float:
-    """a + b rounded outwards, but kept where it is exact, so that zero stays zero; `anything` for inf - inf."""
-    total = a + b
-    if not math.isfinite(total):
-        return anything if total != total else outwards(total)
-    back = total - a
-    error = (a - (total - back)) + (b - back)  # Knuth's two-sum; NaN where it overflows
-    return total if error == 0.0 else outwards(total)
+def _of(name: str, *args: Any) -> Any:
+    """The value of an operation on numbers, its node on nodes."""
+    op = OPS[name]
+    return apply(op, *args) if any([isinstance(each, Node) for each in args]) else op.scalar(*args)
 
 
-def _with_sign(value: float, positive: bool) -> Interval:
-    """Bounds of a rounded product or quotient, which keep the sign that is known."""
-    return (max(0.0, _down(value)), _up(value)) if positive else (_down(value), min(0.0, _up(value)))
+_div, _pow, _min, _max, _where, _equal = [
+    partial(_of, name) for name in ("div", "pow", "minimum", "maximum", "where", "equal")
+]
 
 
-def _product(a: float, b: float) -> Interval:
-    """a * b, rounded down and up; zero times anything is zero."""
-    return (0.0, 0.0) if a == 0.0 or b == 0.0 else _with_sign(a * b, (a > 0.0) == (b > 0.0))
+def _corners(value: Callable[[Any, Any], Any], a: Sequence[Any], b: Sequence[Any]) -> Ends:
+    """The least and the largest value at the corners of the box."""
+    values = list(dict.fromkeys([value(x, y) for x in a[:2] for y in b[:2]]))
+    return reduce(_min, values), reduce(_max, values)
 
 
-def _quotient(a: float, b: float) -> Interval:
-    """a / b for b other than zero, rounded down and up."""
-    return (0.0, 0.0) if a == 0.0 or math.isinf(b) else _with_sign(a / b, (a > 0.0) == (b > 0.0))
+def _if(condition: Any, ends: Sequence[Any], otherwise: Sequence[Any] = REAL_LINE) -> Ends:
+    return _where(condition, ends[0], otherwise[0]), _where(condition, ends[1], otherwise[1])
+
+
+def _by_sign(end: Any, known: Interval, below: Any, above: Any) -> Any:
+    """What is chosen by the sign of a bound of which this is known."""
+    return above if known[0] >= 0.0 else below if known[1] <= 0.0 else _where(end < 0.0, below, above)
+
+
+def _negative(a: Bounded) -> Bounded:
+    return Bounded(-a.high, -a.low, (-a.known[1], -a.known[0]))
 
 
 # Operations.
 
 
-def add(a: Interval, b: Interval) -> Interval:
-    """Bounds of a + b."""
-    return _sum(a[0], b[0], _down, -math.inf), _sum(a[1], b[1], _up, math.inf)
-
-
-def neg(a: Interval) -> Interval:
-    """Bounds of -a."""
-    return -a[1], -a[0]
-
-
-def sub(a: Interval, b: Interval) -> Interval:
-    """Bounds of a - b."""
-    return add(a, neg(b))
-
-
-def _corners(rule: Callable[[float, float], Interval], a: Interval, b: Interval) -> Interval:
-    corners = [rule(x, y) for x in a for y in b]
-    return min([low for low, _ in corners]), max([high for _, high in corners])
-
-
-def mul(a: Interval, b: Interval) -> Interval:
-    """Bounds of a * b."""
-    return _corners(_product, a, b)
-
-
-def square(a: Interval) -> Interval:
-    """Bounds of a * a."""
-    small, large = magnitude(a)
-    return _product(small, small)[0], _product(large, large)[1]
-
-
-def div(a: Interval, b: Interval) -> Interval:
-    """Bounds of a / b."""
-    return REAL_LINE if b[0] <= 0.0 <= b[1] else _corners(_quotient, a, b)
-
-
-def magnitude(a: Interval) -> Interval:
+@Rule
+def magnitude(a: Bounded) -> Ends:
     """Bounds of |a|."""
-    return (0.0 if a[0] <= 0.0 <= a[1] else min(abs(a[0]), abs(a[1]))), max(abs(a[0]), abs(a[1]))
+    if a.known[0] >= 0.0 or a.known[1] <= 0.0:
+        return (a if a.known[0] >= 0.0 else _negative(a))[:2]
+    return _max(_max(a.low, -a.high), 0.0), _max(-a.low, a.high)
 
 
-def _meet(a: Interval, low: float, high: float) -> Interval | None:
-    """The part of `a` in a domain, None if there is none."""
-    kept = max(a[0], low) + 0.0, min(a[1], high) + 0.0  # -0.0 becomes 0.0, of which powers have the sign of the domain
-    return kept if kept[0] <= kept[1] else None
+@Rule
+def mul(a: Bounded, b: Bounded) -> Ends:
+    """Bounds of a * b."""
+    if b.known[0] >= 0.0 or b.known[1] <= 0.0:
+        a, b = b, a
+    if a.known[0] < 0.0 >= a.known[1]:
+        low, high = mul.ends(_negative(a), b)
+        return -high, -low
+    times = operator.mul if all(map(math.isfinite, (*a.known, *b.known))) else partial(_of, "zero_safe_mul")
+    if a.known[0] < 0.0:
+        return _corners(times, a, b)
+    least, most = _by_sign(b.low, b.known, a.high, a.low), _by_sign(b.high, b.known, a.low, a.high)
+    return times(b.low, least), times(b.high, most)
 
 
-@dataclass(frozen=True)
-class Rising:
-    """The interval of a monotonic function on its domain; outside of it there is no number to bound."""
-
-    name: str
-    domain: Interval = REAL_LINE
-    bounds: Interval = REAL_LINE
-    ulps: int = ULPS
-    falling: bool = False
-
-    def __call__(self, a: Interval) -> Interval:
-        """Bounds of its value."""
-        inside = _meet(a, *self.domain)
-        if inside is None:
-            return REAL_LINE
-        first, last = inside[::-1] if self.falling else inside
-        low, high = _end(self.name, first, _down, self.ulps), _end(self.name, last, _up, self.ulps)
-        return max(self.bounds[0], low), min(self.bounds[1], high)
+@Rule
+def div(a: Bounded, b: Bounded) -> Ends:
+    """Bounds of a / b."""
+    if b.known[1] <= 0.0:
+        a, b = _negative(a), _negative(b)
+    elif b.known[0] < 0.0:  # where the divisor is negative, both have their signs turned
+        turn = b.high < 0.0
+        a, b = [Bounded(*_if(turn, _negative(each), each), REAL_LINE) for each in (a, b)]
+    ends = _div(a.low, _by_sign(a.low, a.known, b.low, b.high)), _div(a.high, _by_sign(a.high, a.known, b.high, b.low))
+    return ends if b.known[0] > 0.0 else _if(b.low > 0.0, ends)
 
 
-@dataclass(frozen=True)
-class Wave:
-    """The interval of a sine or cosine, whose maxima lie at top + 2 pi k."""
-
-    name: str
-    top: float
-
-    def __call__(self, a: Interval) -> Interval:
-        """Bounds of its value."""
-        if not max(abs(a[0]), abs(a[1])) < _MAX_ANGLE:
-            return -1.0, 1.0
-        low = (
-            -1.0
-            if _contains_turn(a, self.top + math.pi, math.tau)
-            else min([_end(self.name, x, _down, ULPS) for x in a])
-        )
-        high = 1.0 if _contains_turn(a, self.top, math.tau) else max([_end(self.name, x, _up, ULPS) for x in a])
-        return max(-1.0, low), min(1.0, high)
+@Rule
+def fmod(a: Bounded, b: Bounded) -> Ends:
+    """Bounds of the remainder: at corners where the whole part of a / b is the same, else by sign and size."""
+    low, high = div.ends(a, b)
+    whole = [_of("floor", end) for end in magnitude.ends(Bounded(low, high, REAL_LINE))]
+    _, most = magnitude.ends(b)
+    loose = _min(_max(a.low, -most), 0.0), _max(_min(a.high, most), 0.0)
+    return _if(_equal(*whole), _corners(partial(_of, "fmod"), a, b), loose)
 
 
-def _contains_turn(a: Interval, start: float, period: float) -> bool:
-    """Whether start + period * k lies within the interval for a whole k, or so close that rounding could decide."""
-    return math.floor((a[1] - start) / period + _SLACK) >= math.ceil((a[0] - start) / period - _SLACK)
+@Rule
+def pow(a: Bounded, b: Bounded) -> Ends:
+    """Bounds of a ** b."""
+    exponent, single = b.known[0], b.known[0] == b.known[1]
+    if not (single and exponent.is_integer()):
+        ends = _corners(_pow, (_max(0.0, a.low), a.high), b)  # of zeros the positive one
+        return ends if single or a.known[0] >= 0.0 else _if(a.low >= 0.0, ends)
+    low, high = magnitude.ends(a) if exponent % 2.0 == 0.0 else a[:2]
+    if exponent >= 0.0:
+        return _pow(low, exponent), _pow(high, exponent)
+    return _if(_max(a.low > 0.0, a.high < 0.0), (_pow(high, exponent), _pow(low, exponent)))
 
 
-def tan(a: Interval) -> Interval:
+def rising(name: str, domain: Interval = REAL_LINE, *, falling: bool = False) -> Rule:
+    """The rule of a monotonic function on its domain."""
+
+    def ends(a: Bounded) -> Ends:
+        low = a.low if a.known[0] >= domain[0] else _max(a.low, domain[0])
+        high = a.high if a.known[1] <= domain[1] else _min(a.high, domain[1])
+        return (_of(name, high), _of(name, low)) if falling else (_of(name, low), _of(name, high))
+
+    return Rule(ends)
+
+
+def wave(name: str, slope: str, sign: float) -> Rule:
+    """The rule of a sine or cosine: it turns between ends whose slopes differ in sign, or half a period apart."""
+
+    def ends(a: Bounded) -> Ends:
+        values, (rise, last) = [[_of(each, end) for end in a[:2]] for each in (name, slope)]
+        turns = rise * last < 0.0
+        top = turns * (sign * rise > 0.0)
+        long = 1.0 - (a.high - a.low < _where(turns, math.tau, math.pi))
+        return _where(long + (turns - top), -1.0, _min(*values)), _where(long + top, 1.0, _max(*values))
+
+    return Rule(ends)
+
+
+@Rule
+def tan(a: Bounded) -> Ends:
     """Bounds of tan a, none beside a pole."""
-    if _tan_pole(a):
-        return REAL_LINE
-    return Rising("tan")(a)
+    (low, first), (high, last) = [(_of("tan", end), _of("cos", end)) for end in a[:2]]
+    return _if((a.high - a.low < math.pi) * (first * last > 0.0), (low, high))
+
+
+@Rule
+def atan2(y: Bounded, x: Bounded) -> Ends:
+    """Bounds of the angle of (x, y), which jumps along a half line, where both of its ends count."""
+    beside = _max(_max(y.low > 0.0, y.high < 0.0), x.low > 0.0)
+    return _if(beside, _corners(partial(_of, "atan2"), y, x), (-math.pi, math.pi))
+
+
+@Rule
+def where(c: Bounded, a: Bounded, b: Bounded) -> Ends:
+    """Bounds of the part that the condition can choose."""
+    least, most = magnitude.ends(c)
+    return _if(least > 0.0, a, _if(most, (_min(a.low, b.low), _max(a.high, b.high)), b))
+
+
+@Rule
+def equal(a: Bounded, b: Bounded) -> Ends:
+    """Bounds of a == b."""
+    return _equal(a.low, b.high) * _equal(a.high, b.low), 1.0 - _max(a.high < b.low, b.high < a.low)
+
+
+add = Rule(lambda a, b: (a.low + b.low, a.high + b.high))
+sub = Rule(lambda a, b: (a.low - b.high, a.high - b.low))
+neg = Rule(lambda a: _negative(a)[:2])
+square = Rule(lambda a: [end * end for end in magnitude.ends(a)])
+cosh = Rule(lambda a: [_of("cosh", end) for end in magnitude.ends(a)])
+hypot = Rule(lambda a, b: [_of("hypot", *ends) for ends in zip(magnitude.ends(a), magnitude.ends(b), strict=True)])
+minimum = Rule(lambda a, b: (_min(a.low, b.low), _min(a.high, b.high)))
+maximum = Rule(lambda a, b: (_max(a.low, b.low), _max(a.high, b.high)))
+less = Rule(lambda a, b: (a.high < b.low, 1.0 - (b.high <= a.low)))
+less_equal = Rule(lambda a, b: (a.high <= b.low, 1.0 - (b.high < a.low)))
+not_equal = Rule(lambda a, b: [1.0 - flag for flag in reversed(equal.ends(a, b))])
+
+
+def always(value: float) -> Callable[[Interval], Interval]:
+    """The rule of a value that does not depend on the argument."""
+    return lambda a: (value, value)
+
+
+# Where a slope is unbounded or is none, in words that follow "the slope of sqrt is".
 
 
 def no_tangent(a: Interval) -> str | None:
     """The poles of the tangent."""
-    return "value and slope are infinite at odd multiples of pi/2" if _tan_pole(a) else None
-
-
-def _tan_pole(a: Interval) -> bool:
-    return not max(abs(a[0]), abs(a[1])) < _MAX_ANGLE or _contains_turn(a, math.pi / 2, math.pi)
-
-
-def cosh(a: Interval) -> Interval:
-    """Bounds of cosh a."""
-    low, high = Rising("cosh")(magnitude(a))
-    return max(low, 1.0), high
-
-
-def hypot(a: Interval, b: Interval) -> Interval:
-    """Bounds of sqrt(a * a + b * b)."""
-    (a0, a1), (b0, b1) = magnitude(a), magnitude(b)
-    low = math.hypot(a0, b0)
-    return max(0.0, _down(low, ULPS)), _up(math.hypot(a1, b1), ULPS)
-
-
-def atan2(y: Interval, x: Interval) -> Interval:
-    """Bounds of the angle of (x, y)."""
-    if y[0] <= 0.0 <= y[1] and x[0] <= 0.0:  # the origin, or the half line along which the angle jumps
-        return _down(-math.pi), _up(math.pi)
-    corners = [math.atan2(v, u) for v in y for u in x]
-    low, high = min(corners), max(corners)
-    return (low if low == 0.0 else _down(low, ULPS)), (high if high == 0.0 else _up(high, ULPS))  # zero is exact
-
-
-def pow(a: Interval, b: Interval) -> Interval:
-    """Bounds of a ** b."""
-    if b[0] == b[1] and b[0].is_integer():
-        return _whole_power(a, b[0])
-    if a[0] < 0.0 and b[0] != b[1]:
-        return REAL_LINE  # a whole exponent between the bounds has a value there, another has none
-    inside = _meet(a, 0.0, math.inf)
-    if inside is None:
-        return REAL_LINE
-    corners = [OPS["pow"].scalar(x, y) for x in inside for y in b]
-    return max(0.0, _down(min(corners), ULPS)), _up(max(corners), ULPS)
-
-
-def _whole_power(a: Interval, n: float) -> Interval:
-    if n == 0.0:
-        return 1.0, 1.0
-    if n < 0.0 and a[0] <= 0.0 <= a[1]:
-        return REAL_LINE
-    ends = [OPS["pow"].scalar(x, n) for x in a]
-    if n % 2.0 == 0.0:
-        low = 0.0 if a[0] <= 0.0 <= a[1] else max(0.0, _down(min(ends), ULPS))
-        return low, _up(max(ends), ULPS)
-    return _down(min(ends), ULPS), _up(max(ends), ULPS)
-
-
-def where(c: Interval, a: Interval, b: Interval) -> Interval:
-    """Bounds of the part that the condition can choose."""
-    if c == (0.0, 0.0):
-        return b
-    return a if c[0] > 0.0 or c[1] < 0.0 else (min(a[0], b[0]), max(a[1], b[1]))
-
-
-def minimum(a: Interval, b: Interval) -> Interval:
-    """Bounds of the smaller."""
-    return min(a[0], b[0]), min(a[1], b[1])
-
-
-def maximum(a: Interval, b: Interval) -> Interval:
-    """Bounds of the larger."""
-    return max(a[0], b[0]), max(a[1], b[1])
-
-
-def fmod(a: Interval, b: Interval) -> Interval:
-    """Bounds of the remainder of a / b: of the sign of a, not larger than a, and smaller than b."""
-    if b[0] <= 0.0 <= b[1]:
-        return REAL_LINE
-    if magnitude(a)[1] < magnitude(b)[0]:
-        return a
-    size = min(magnitude(a)[1], magnitude(b)[1])
-    return (-size if a[0] < 0.0 else 0.0), (size if a[1] > 0.0 else 0.0)
-
-
-def always(value: float) -> Callable[[Interval], Interval]:
-    """A value that does not depend on the argument."""
-    return lambda a: (value, value)
-
-
-def less(a: Interval, b: Interval) -> Interval:
-    """Bounds of a < b."""
-    return (1.0, 1.0) if a[1] < b[0] else (0.0, 0.0) if a[0] >= b[1] else FLAG
-
-
-def less_equal(a: Interval, b: Interval) -> Interval:
-    """Bounds of a <= b."""
-    return (1.0, 1.0) if a[1] <= b[0] else (0.0, 0.0) if a[0] > b[1] else FLAG
-
-
-def equal(a: Interval, b: Interval) -> Interval:
-    """Bounds of a == b."""
-    if a == b and a[0] == a[1]:
-        return 1.0, 1.0
-    return (0.0, 0.0) if a[1] < b[0] or b[1] < a[0] else FLAG
-
-
-def not_equal(a: Interval, b: Interval) -> Interval:
-    """Bounds of a != b."""
-    low, high = equal(a, b)
-    return 1.0 - high, 1.0 - low
-
-
-# Where a slope is unbounded or is none, in words that follow "the slope of sqrt is".
+    return "value and slope are infinite at odd multiples of pi/2" if tan(a) == REAL_LINE else None
 
 
 def below(limit: float, there: str) -> Callable[[Interval], str | None]:

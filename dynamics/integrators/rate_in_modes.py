@@ -15,7 +15,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import SMOOTH, columns, kept_by_first
+from cgraph._shared import SMOOTH, intervals, kept_by_first
 from cgraph.extend import Builder, building, folded, tangents, topological
 
 from ..systems.arguments import new_variables
@@ -183,18 +183,7 @@ class _Reader:
 
 def _excludes_zero(g: Node) -> bool:
     """Whether g is on one side of zero for any values of its variables."""
-    anything, bounds = (-math.inf, math.inf), dict[Node, tuple[float, float]]()
-    for node in topological([g]):
-        op = columns(node.op)
-        if node.value is not None:
-            bounds[node] = (node.value, node.value)
-        elif not node.args or op.interval is None:
-            bounds[node] = anything
-        elif len(node.args) == 2 and node.args[0] is node.args[1] and op.interval_of_same is not None:
-            bounds[node] = op.interval_of_same(bounds[node.args[0]])
-        else:
-            bounds[node] = op.interval(*[bounds[arg] for arg in node.args])
-    low, high = bounds[g]
+    low, high = intervals(topological([g]), {})[g]
     return low > 0.0 or high < 0.0
 
 

@@ -3,48 +3,32 @@
 from collections.abc import Mapping
 
 from ...core.evaluation import box_interval
-from ...core.graph import Graph
-from ...core.node import CONSTANT, VARIABLE, Node
-from ...operations.bounds import REAL_LINE, value_of
+from ...operations.bounds import intervals
 from ...operations.operation import Interval, Op, columns
 from ...util.json_type import Json, json_number
 from ...util.require import require_mapping
 from ..names import Names
 from .finding import Finding
 
+ROUNDING = 2.0**-48  # of bounds, relative
 Box = Mapping[str, float | tuple[float, float]]
-
-
-def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
-    """Bounds of the value of every node for inputs in the box; an input that it leaves out is any number.
-
-    box: {input: (low, high) or a number}. The bounds hold, but may be wide: an interval forgets which values belong
-    together. Raises GraphError for an unknown input, ValueError for what is no interval.
-    """
-    given = _given(Names(graph), box)
-    found: dict[Node, Interval] = {}
-    for node in graph.nodes:
-        if node.op is VARIABLE:
-            found[node] = given.get(str(node.name), REAL_LINE)
-        elif node.op is CONSTANT:
-            assert node.value is not None
-            found[node] = (node.value, node.value)
-        else:
-            same = len(node.args) == 2 and node.args[0] is node.args[1]
-            found[node] = value_of(columns(node.op), [found[arg] for arg in node.args], same=same)
-    return found
 
 
 def singular_at(op: Op, arguments: list[Interval]) -> str | None:
     """Words on where in the arguments' intervals the operation has no bounded slope; None if nowhere."""
     if op.singular is not None:
-        return op.singular(*arguments)
+        return op.singular(*arguments) or op.singular(*[_widened(*each) for each in arguments])
     return None if op.interval is not None else f"{op.name}, of which no bounds are known"
+
+
+def _widened(low: float, high: float) -> Interval:
+    """An interval with the rounding of its ends; zero and what is one number are exact."""
+    return (low, high) if low == high else (low - ROUNDING * abs(low), high + ROUNDING * abs(high))
 
 
 def singular_nodes(names: Names, box: Box) -> list[Finding]:
     """The operations that could meet a singular point of theirs for inputs in the box."""
-    bounds = intervals(names.graph, _given(names, box))
+    bounds = intervals(names.graph.nodes, _given(names, box))
     findings = []
     for node in names.graph.nodes:
         reason = singular_at(columns(node.op), [bounds[arg] for arg in node.args]) if node.args else None
@@ -66,6 +50,6 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
 
 
 def _given(names: Names, box: Box) -> dict[str, Interval]:
-    """The box by the graph's names. Raises as `intervals` does."""
+    """The box by the graph's names. Raises GraphError for an unknown input, ValueError for what is no interval."""
     known = names.inputs_of("box", require_mapping("box", box, "input: interval"))
     return {name: box_interval(names.shown(name), value) for name, value in known.items()}

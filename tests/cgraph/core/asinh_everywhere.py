@@ -16,9 +16,9 @@ import dynamics as dyn
 import viz
 from cgraph.core.node import apply
 from cgraph.explain.lint.cancellation import ROUNDOFF, rounded
-from cgraph.explain.lint.singular import intervals
 from cgraph.explain.names import Names
 from cgraph.extend import OPS
+from cgraph.operations.bounds import intervals
 from tests.cgraph.engines import RUNNERS
 from tests.javascript import evaluated_by_js
 from tests.page_script import run_script
@@ -65,7 +65,7 @@ def test_simplification_folds_and_shares():
 def test_lint():
     (finding,) = cg.lint(GRAPH, box={"x": (0.5, 2.0)}).findings
     assert "asinh, of which no bounds are known; x is within [0.5, 2]" in str(finding)
-    assert set(intervals(GRAPH, {"x": (0.5, 2.0)}).values()) == {(0.5, 2.0), (-math.inf, math.inf)}
+    assert set(intervals(GRAPH.nodes, {"x": (0.5, 2.0)}).values()) == {(0.5, 2.0), (-math.inf, math.inf)}
     at = {"x": 0.6}
     value = GRAPH.evaluate(at)["y"]
     inherited = 0.6 * ROUNDOFF / math.hypot(1.0, 0.6)  # of an input that is half a unit off

@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph.core.node import apply
 from cgraph.extend import OPS, Op, enclosure
+from cgraph.operations.bounds import intervals
 from tests.cgraph.engines import graph_of
 from tests.each_row import each_row
 from tests.strategies import Case, cases, examples
@@ -26,6 +27,9 @@ def check(graph: cg.Graph, low: np.ndarray, high: np.ndarray, points: np.ndarray
     points: (.., inputs, boxes). Points outside are left out, as are those where something on the way is not finite.
     """
     least, most = np.vsplit(cg.compile(enclosure(graph), "numpy").batch(np.vstack([low, high])), 2)
+    for k in range(0, low.shape[1], 20):  # the rules on floats are the same
+        found = intervals(graph.nodes, dict(zip(graph.input_names, np.stack([low, high], axis=-1)[:, k], strict=True)))
+        least[:, k], most[:, k] = np.transpose([found[node] for node in graph.outputs.values()])
     assert not np.isnan([least, most]).any()
     run = cg.compile(cg.Graph(graph.inputs, {str(i): each for i, each in enumerate(graph.nodes)}), "numpy").batch
     places = [graph.nodes.index(each) for each in graph.outputs.values()]

@@ -9,7 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.explain.lint.singular import intervals
+from cgraph.operations.bounds import intervals
 from cgraph.operations.table import FLAT
 from tests.cgraph.codegen.test_c import agrees, needs_cc
 from tests.cgraph.engines import ENGINES, evaluated
@@ -148,7 +148,7 @@ def test_comparisons_say_whether_their_knots_are_kinks_through_all_transforms(ki
 def test_bounds_hold():
     graph, points = all_kinds()
     low, high = float(points.min()), float(points.max())
-    bounds = intervals(graph, {"x": (low, high)})
+    bounds = intervals(graph.nodes, {"x": (low, high)})
     rows = evaluated(graph, points)
     for node, column in zip(graph.outputs.values(), rows.T, strict=True):
         assert bounds[node][0] <= column.min()

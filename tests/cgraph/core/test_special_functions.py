@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.explain.lint.singular import intervals
+from cgraph.operations.bounds import intervals
 from tests.cgraph.engines import ENGINES
 from tests.each_row import each_row
 from tests.ulps import same
@@ -92,4 +92,4 @@ def test_folding_of_signs_and_of_whole_numbers():
     ],
 )
 def test_bounds(node, box, expected):
-    assert intervals(cg.Graph([x], {"f": node}), {"x": box})[node] == expected
+    assert intervals(cg.Graph([x], {"f": node}).nodes, {"x": box})[node] == expected
