@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from graphviz import Digraph
 
 
-DIRECTIONS = ("BT", "TB", "LR", "RL")
-
-
 def to_dot(
     graph: Graph,
     *,
@@ -111,7 +108,7 @@ def to_dot(
     ['n0 -> n1', 'n1 -> o0']
     """
     require_graph("to_dot", graph)
-    require_choice("rankdir", rankdir, DIRECTIONS)
+    require_choice("rankdir", rankdir, ("BT", "TB", "LR", "RL"))
     words = require_texts("legend", legend) if isinstance(legend, Mapping) else {}
     if not isinstance(legend, Mapping):
         require_flag("legend", legend)
@@ -186,11 +183,8 @@ def plain_drawing(
     )
 
 
-LONGEST_LABEL = 10  # characters that fit a node
-
-
-def short_formulas(graph: Graph, names: Mapping[str, str], length: int = LONGEST_LABEL) -> dict[Node, str]:
-    """The formulas of those operations without a name that have one of at most `length` characters.
+def short_formulas(graph: Graph, names: Mapping[str, str], length: int = 10) -> dict[Node, str]:
+    """The formulas of those operations without a name that have one of at most `length` characters, which fit a node.
 
     names: {name in the graph: text shown}.
     """
