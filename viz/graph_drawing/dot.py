@@ -20,14 +20,11 @@ from cgraph.extend import Names
 
 from .. import theme
 from ..theme import Paint
-from .boxes_and_arrows import ClusterRule, plan_of
+from .boxes_and_arrows import ClusterRule, Plan
 from .draw_shapes import digraph, draw_arrows, draw_boxes, draw_legend, literal
 
 if TYPE_CHECKING:
     from graphviz import Digraph
-
-
-DIRECTIONS = ("BT", "TB", "LR", "RL")
 
 
 def to_dot(
@@ -111,14 +108,14 @@ def to_dot(
     ['n0 -> n1', 'n1 -> o0']
     """
     require_graph("to_dot", graph)
-    require_choice("rankdir", rankdir, DIRECTIONS)
+    require_choice("rankdir", rankdir, ("BT", "TB", "LR", "RL"))
     words = require_texts("legend", legend) if isinstance(legend, Mapping) else {}
     if not isinstance(legend, Mapping):
         require_flag("legend", legend)
     for what, text in (("caption", "" if caption is None else caption), ("marked_label", marked_label)):
         if not isinstance(text, str):
             raise TypeError(f"{what} must be text, got {type(text).__name__}: {text!r:.60}")
-    plan = plan_of(
+    plan = Plan(
         graph,
         require_texts("names", names),
         {} if formulas is None else require_mapping("formulas", formulas, "node: text"),
@@ -127,17 +124,18 @@ def to_dot(
         frozenset(require_sequence("wrong_outputs", wrong_outputs, "names", str)),
         _cluster_rule(clusters),
         require_sequence("collapse", collapse, "tags", str),
-        None if only is None else frozenset(require_sequence("only", only, "nodes", Node)),
+        frozenset(graph.nodes if only is None else require_sequence("only", only, "nodes", Node)),
     )
     drawing = digraph(rankdir)
     if caption is not None:
         counts = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.edges), 'edge')}"
         counts = counts if only is None else f"{len(set(only))} of {counts}"
         drawing.attr(label=literal(f"{caption}\n{counts}" if caption else counts), labelloc="b", fontsize="16")
-    draw_boxes(drawing, plan.boxes)
+    boxes = list(plan.boxes())
+    draw_boxes(drawing, boxes)
     if legend is not False:
-        draw_legend(drawing, theme.in_words(plan.kinds, words), vertical=rankdir in ("BT", "TB"))
-    draw_arrows(drawing, plan.arrows)
+        draw_legend(drawing, boxes, words, vertical=rankdir in ("BT", "TB"))
+    draw_arrows(drawing, plan.arrows())
     return drawing
 
 
@@ -185,11 +183,8 @@ def plain_drawing(
     )
 
 
-LONGEST_LABEL = 10  # characters that fit a node
-
-
-def short_formulas(graph: Graph, names: Mapping[str, str], length: int = LONGEST_LABEL) -> dict[Node, str]:
-    """The formulas of those operations without a name that have one of at most `length` characters.
+def short_formulas(graph: Graph, names: Mapping[str, str], length: int = 10) -> dict[Node, str]:
+    """The formulas of those operations without a name that have one of at most `length` characters, which fit a node.
 
     names: {name in the graph: text shown}.
     """

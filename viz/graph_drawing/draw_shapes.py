@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -85,14 +85,21 @@ def _draw_box(drawing: Digraph, box: Box) -> None:
     drawing.node(box.id, id=box.id, color=box.kind.line, fillcolor=box.kind.fill, **_escaped(box.attributes))
 
 
-def draw_arrows(drawing: Digraph, arrows: Sequence[Arrow]) -> None:
+def draw_arrows(drawing: Digraph, arrows: Iterable[Arrow]) -> None:
     """Add the arrows."""
     for arrow in arrows:
         drawing.edge(arrow.tail, arrow.head, **_escaped(arrow.attributes))
 
 
-def draw_legend(drawing: Digraph, kinds: Sequence[Paint], *, vertical: bool) -> None:
-    """Add a frame with a box for each kind.  vertical: one below the other where ranks are rows."""
+def draw_legend(drawing: Digraph, boxes: Sequence[Box], words: Mapping[str, str], *, vertical: bool) -> None:
+    """Add a frame with a box for each kind, in the order of the theme.  vertical: one below the other.
+
+    words: {role: what the legend says of it}.
+    """
+    order = [paint.words for paint in (*theme.ROLES.values(), theme.OUTPUT, theme.COLLAPSED)]
+    present = {box.kind.words: box.kind for box in boxes}
+    rest = [text for text in present if text not in order]
+    kinds = theme.in_words([present[text] for text in (*order, *rest) if text in present], words)
     with drawing.subgraph(name="cluster_legend") as frame:
         frame.attr(id="legend", label="legend", tooltip="legend", style="rounded", color=theme.LINE, fontsize="12")
         for i, kind in enumerate(kinds):

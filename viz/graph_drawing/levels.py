@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
@@ -72,10 +73,15 @@ def levels_svg(panels: Sequence[LevelPanel], scale: Scale) -> str:
     drawn, x = list[str](), SIDE
     for panel in panels:
         offsets, width = _across(panel.graph, scale)
-        width = max(width, *[0.62 * FONT * len(text) for text in (panel.title, _sizes(panel.graph))])
+        size = panel.graph.counts()
+        sizes = f"{counted(size.nodes, 'node')}, {counted(size.edges, 'edge')}, {size.depth} deep, {size.width} wide"
+        heading, width = _heading(panel.title, sizes, x, 14.0, width)
+        drawn += heading
+        for words, level in panel.marks.items():
+            y = scale.y(level, depth)
+            drawn += [_rule(x, x + width, y, 'stroke-dasharray="5 4"'), _label(x, y - 5, words, "start")]
         at = {node: (x + left, scale.y(level, depth)) for node, (left, level) in offsets.items()}
-        marks = {words: scale.y(level, depth) for words, level in panel.marks.items()}
-        drawn += [*_words(panel, x, width, marks), *_lines(panel.graph, at), *_nodes(panel.graph, at, scale)]
+        drawn += [*_lines(panel.graph, at), *_nodes(panel.graph, at, scale)]
         x += width + SIDE
     heights = {level: scale.y(level, depth) for level in range(0, depth + 1, scale.ticks)}
     return _with_rows(x - SIDE, heights, scale.y(0, depth) + scale.row / 2, drawn)
@@ -85,8 +91,14 @@ def _with_rows(right: float, heights: Mapping[int, float], bottom: float, drawn:
     """The picture, with lines and numbers of its rows.  heights: {level: pixels from the top}."""
     rows = []
     for level, y in heights.items():
-        rows += [rule(SIDE - 10, right, y, 'stroke-opacity="0.2"'), label(SIDE - 14, y + 4, str(level), "end")]
-    return picture(right + 8, bottom + FOOT, [*rows, *drawn])
+        rows += [_rule(SIDE - 10, right, y, 'stroke-opacity="0.2"'), _label(SIDE - 14, y + 4, str(level), "end")]
+    width, height = right + 8, bottom + FOOT
+    return (
+        f'<svg width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}" '
+        f'xmlns="http://www.w3.org/2000/svg"><g class="graph" font-family="{theme.FONT_FAMILIES}" font-size="{FONT}" '
+        f'fill="{theme.TEXT}"><polygon fill="white" stroke="none" points="0,0 0,{height:.0f} {width:.0f},{height:.0f} '
+        f'{width:.0f},0"/>{"".join([*rows, *drawn])}</g></svg>\n'
+    )
 
 
 def _across(graph: Graph, scale: Scale) -> tuple[dict[Node, tuple[float, int]], float]:
@@ -126,22 +138,14 @@ def _spread(at: dict[Node, float], row: Sequence[Node], wish: Sequence[float], g
     at |= {node: start + i * gap for i, (node, start) in enumerate(zip(row, starts, strict=True))}
 
 
-def _sizes(graph: Graph) -> str:
-    counts = graph.counts()
-    return f"{counted(counts.nodes, 'node')}, {counted(counts.edges, 'edge')}, {counts.depth} deep, {counts.width} wide"
-
-
-def _words(panel: LevelPanel, x: float, width: float, marks: Mapping[str, float]) -> list[str]:
-    """Title, sizes, and the lines across."""
-    parts = [label(x, 14, panel.title, "start", 'font-weight="bold"'), label(x, 31, _sizes(panel.graph), "start")]
-    for words, y in marks.items():
-        parts += [rule(x, x + width, y, 'stroke-dasharray="5 4"'), label(x, y - 5, words, "start")]
-    return parts
+def _heading(title: str, sizes: str, x: float, y: float, width: float) -> tuple[list[str], float]:
+    """Title and sizes of a panel, and its width with them."""
+    texts = [_label(x, y, title, "start", 'font-weight="bold"'), _label(x, y + 17, sizes, "start")]
+    return texts, max([width, *[0.62 * FONT * len(text) for text in (title, sizes)]])
 
 
 def _lines(graph: Graph, at: Mapping[Node, Place]) -> list[str]:
-    way = longest_way(graph)
-    thick = [*pairwise(way)]
+    thick = [*pairwise(longest_way(graph))]
     thin = [(edge.source, edge.target) for edge in graph.edges if edge.source.value is None]
     faint = [_curve(at[a], at[b], 1.0, 0.55 if a.args else 0.25) for a, b in thin if (a, b) not in thick]
     return [*faint, *[_curve(at[a], at[b], 3.0, 1.0) for a, b in thick]]
@@ -160,8 +164,10 @@ def _nodes(graph: Graph, at: Mapping[Node, Place], scale: Scale) -> list[str]:
         look = f'fill="{paint.fill}" stroke="{paint.line}" stroke-width="1.2"'
         parts.append(f"<rect {_around(x, y, w, h, node)} {look}/>")
         if scale.names:
-            parts.append(f'<g class="node">{label(x, y + 4, _shown(node, scale), "middle")}</g>')
-            parts += [label(x, y - h / 2 - 6, " = ".join(outputs[node]), "middle")] if node in outputs else []
+            number = "" if node.value is None else f"{node.value:.3g}"
+            text = columns(node.op).symbol if node.args else number or scale.names.get(str(node.name), str(node.name))
+            parts.append(f'<g class="node">{_label(x, y + 4, text, "middle")}</g>')
+            parts += [_label(x, y - h / 2 - 6, " = ".join(outputs[node]), "middle")] if node in outputs else []
     return parts
 
 
@@ -173,12 +179,6 @@ def _around(x: float, y: float, width: float, height: float, node: Node) -> str:
     )
 
 
-def _shown(node: Node, scale: Scale) -> str:
-    if node.args:
-        return columns(node.op).symbol
-    return f"{node.value:.3g}" if node.value is not None else scale.names.get(str(node.name), str(node.name))
-
-
 def _curve(start: Place, end: Place, thickness: float, strength: float) -> str:
     (x, y), (to_x, to_y) = start, end
     bend = (y - to_y) / 2
@@ -188,24 +188,13 @@ def _curve(start: Place, end: Place, thickness: float, strength: float) -> str:
     )
 
 
-def rule(left: float, right: float, y: float, look: str) -> str:
-    """A line across."""
+def _rule(left: float, right: float, y: float, look: str) -> str:
     return f'<path d="M{left:.1f} {y:.1f}H{right:.1f}" stroke="{theme.LINE.lower()}" {look}/>'
 
 
-def label(x: float, y: float, text: str, anchor: str, look: str = "") -> str:
+def _label(x: float, y: float, text: str, anchor: str, look: str = "") -> str:
     """A text; anchor: which end of it is at x."""
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {look}>{escape(text)}</text>'
-
-
-def picture(width: float, height: float, parts: Sequence[str]) -> str:
-    """A picture of parts, on white, as `to_adaptive` takes it."""
-    return (
-        f'<svg width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}" '
-        f'xmlns="http://www.w3.org/2000/svg"><g class="graph" font-family="{theme.FONT_FAMILIES}" font-size="{FONT}" '
-        f'fill="{theme.TEXT}"><polygon fill="white" stroke="none" points="0,0 0,{height:.0f} {width:.0f},{height:.0f} '
-        f'{width:.0f},0"/>{"".join(parts)}</g></svg>\n'
-    )
 
 
 TICKS = 100  # levels between numbers
@@ -225,9 +214,8 @@ def silhouettes_svg(panels: Sequence[LevelPanel], row: float = 1.0, node: float 
     for panel in panels:
         counts = panel.graph.counts()
         sizes = f"{counted(counts.nodes, 'node')}, {counts.depth} deep"
-        width = max(node * counts.width, *[0.62 * FONT * len(text) for text in (panel.title, sizes)])
-        top = y(counts.depth) - 24
-        drawn += [label(x, top, panel.title, "start", 'font-weight="bold"'), label(x, top + 17, sizes, "start")]
+        heading, width = _heading(panel.title, sizes, x, y(counts.depth) - 24, node * counts.width)
+        drawn += heading
         for paint, path in _rows(panel.graph, x, node).items():
             rows = "".join(
                 [f"M{left:.1f} {y(k + 0.5):.1f}h{wide:.1f}v{row:.1f}h{-wide:.1f}z" for k, left, wide in path]
@@ -239,16 +227,12 @@ def silhouettes_svg(panels: Sequence[LevelPanel], row: float = 1.0, node: float 
 
 def _rows(graph: Graph, x: float, node: float) -> dict[theme.Paint, list[tuple[int, float, float]]]:
     """{color: (level, left end, width) of its bar on every level that has it}."""
-    paints = list(theme.ROLES.values())
-    levels: dict[int, dict[theme.Paint, int]] = {}
-    for each, level in levels_of(graph).items():
-        paint = theme.ROLES[theme.role_of(each)]
-        row = levels.setdefault(level, {})
-        row[paint] = row.get(paint, 0) + 1
+    sizes = Counter([(level, theme.role_of(each)) for each, level in levels_of(graph).items()])
     bars: dict[theme.Paint, list[tuple[int, float, float]]] = {}
-    for level, row in levels.items():
+    for level in range(graph.counts().depth + 1):
         left = x
-        for paint in sorted(row, key=paints.index):
-            bars.setdefault(paint, []).append((level, left, node * row[paint]))
-            left += node * row[paint]
+        for role, paint in theme.ROLES.items():
+            if wide := node * sizes[level, role]:
+                bars.setdefault(paint, []).append((level, left, wide))
+                left += wide
     return bars

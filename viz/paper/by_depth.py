@@ -29,7 +29,11 @@ LARGE_SCALE = Scale(
 )
 SMALL_SCALE = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
 LINKS = 50  # of the chain that is drawn as a silhouette
-METHODS = ("recursive", "balanced")
+SILHOUETTES = (
+    f"Figure 7c. Not in the paper: a planar chain of {LINKS} links in both forms and both orders of elimination. A row for each "
+    "operation on the longest path to a node, as wide as there are nodes on it: areas are numbers of nodes, in the "
+    "colors of Figure 7. Towers that are high and narrow leave a machine little to do at the same time."
+)
 SIZES = ("nodes", "edges", "depth", "width")
 
 
@@ -51,7 +55,7 @@ def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
     kinds.remove(theme.OUTPUT)  # a ring around a node here, as the captions say
     legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS), 1)
     long, orders = chain(0.1, 0.1, LINKS), dict[str, Graph]()
-    for method in METHODS:
+    for method in ("recursive", "balanced"):
         orders |= {f"Lagrange, {method}": state_equation(long, method)}
         orders |= {f"Hamilton, {method}": hamilton_equations(long, method)}
     each = [f"{title} {len(graph.nodes)} nodes, {graph.counts().depth} deep" for title, graph in orders.items()]
@@ -65,7 +69,7 @@ def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
         Paragraph(_cause(sizes[ARM])),
         Table("Sizes of both forms", ("", *SIZES), _rows(sizes), file="fig7"),
         Paragraph(_remedy(orders)),
-        drawn("fig7c", silhouettes, _silhouettes_caption(LINKS), "100%", towers),
+        drawn("fig7c", silhouettes, SILHOUETTES, "100%", towers),
     ]
     data = {name: {form: _size(counts) for form, counts in each.items()} for name, each in sizes.items()}
     data[f"a planar chain of {LINKS}"] = {title: _size(graph.counts()) for title, graph in orders.items()}
@@ -105,12 +109,14 @@ def _seen(what: str, forms: Mapping[str, Counts]) -> str:
 
 def _answer(forms: Mapping[str, Counts]) -> str:
     lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
+    compact, parallel = (
+        "yes" if less else "no" for less in (hamilton.nodes < lagrange.nodes, hamilton.depth < lagrange.depth)
+    )
     return (
         "Section 5 of the paper leaves the Hamiltonian graph to future work, and expects of it parallelism in place of "
         "depth, and a more compact graph. "
-        f"More compact: {_yes(hamilton.nodes < lagrange.nodes)}, {hamilton.nodes} nodes in place of {lagrange.nodes}. "
-        f"More parallel: {_yes(hamilton.depth < lagrange.depth)}, {hamilton.depth} operations deep in place of "
-        f"{lagrange.depth}."
+        f"More compact: {compact}, {hamilton.nodes} nodes in place of {lagrange.nodes}. "
+        f"More parallel: {parallel}, {hamilton.depth} operations deep in place of {lagrange.depth}."
     )
 
 
@@ -138,15 +144,3 @@ def _remedy(orders: Mapping[str, Graph]) -> str:
         f"{nodes['Lagrange, balanced'] / nodes['Lagrange, recursive']:.1f} and "
         f"{nodes['Hamilton, balanced'] / nodes['Hamilton, recursive']:.1f} times the nodes."
     )
-
-
-def _silhouettes_caption(links: int) -> str:
-    return (
-        f"Figure 7c. Not in the paper: a planar chain of {links} links in both forms and both orders of elimination. A row for each "
-        "operation on the longest path to a node, as wide as there are nodes on it: areas are numbers of nodes, in the "
-        "colors of Figure 7. Towers that are high and narrow leave a machine little to do at the same time."
-    )
-
-
-def _yes(holds: bool) -> str:
-    return "yes" if holds else "no"

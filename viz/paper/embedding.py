@@ -16,32 +16,26 @@ from ..pages.formulation_table import COLORS, TITLES
 from ..plots.direct_labels import Line, PlotPanel, labeled
 from .part import Part, plotted
 
-LINKS = (1, 2, 3, 6)
-
-
 STEPS = tuple(10.0 ** (-k / 2) for k in range(4, 13))  # s, 1e-2 to 1e-6
 
 
 @dataclass(frozen=True)
 class EmbeddingError:
-    """At one state of a model: how far a formulation's torque is from the true one, and from its limit.
+    """At one state of an arm: how far a formulation's torque is from the true one, and from its limit, at `STEPS`.
 
-    error, distance: (len(dt),) largest entries [N m].  limit: (n,), the part of tau + limit that stays as dt -> 0.
-    slope: fitted power of dt in `distance`.
+    error, distance: largest entries [N m] at each step.  limit: the largest of the part that stays as dt -> 0.
+    slope: fitted power of dt in `distance`; None where it is exact.
     """
 
     formulation: str
     n: int
-    dt: Array
-    error: Array  # |tau_formulation - tau|
-    distance: Array  # |tau_formulation - (tau + limit)|
-    limit: Array  # dL/dq by definition, dK/dq for kinetic only
-    slope: float
+    error: list[float]  # |tau_formulation - tau|
+    distance: list[float]  # |tau_formulation - (tau + limit)|
+    limit: float  # of dL/dq by definition, dK/dq for kinetic only
+    slope: float | None
 
 
-def embedding_error(
-    model: Model, q: Array, qd: Array, qdd: Array, formulation: str, steps: Sequence[float] = STEPS
-) -> EmbeddingError:
+def embedding_error(model: Model, q: Array, qd: Array, qdd: Array, formulation: str) -> EmbeddingError:
     """The error at the state (q, qd, qdd), each (n,), for "by_definition" or "kinetic_only"."""
     system = as_system(model)
     energy = {"by_definition": system.lagrangian, "kinetic_only": system.kinetic}[formulation]
@@ -51,35 +45,28 @@ def embedding_error(
     limit = cg.compile(slopes)(np.concatenate([q, qd, parameters]))
     flawed = cg.compile(inverse_dynamics(system, formulation))
     error, distance = [], []
-    for dt in steps:
+    for dt in STEPS:
         tau = flawed(np.concatenate([q - qd * dt, qd - qdd * dt, qdd, [dt], parameters]))
-        error.append(np.abs(tau - true).max())
-        distance.append(np.abs(tau - true - limit).max())
-    fitted = exponent(steps, distance) if min(distance) > 0 else float("nan")
-    return EmbeddingError(formulation, system.n, np.array(steps), np.array(error), np.array(distance), limit, fitted)
+        error.append(float(np.abs(tau - true).max()))
+        distance.append(float(np.abs(tau - true - limit).max()))
+    fitted = exponent(STEPS, distance) if min(distance) > 0 else None
+    return EmbeddingError(formulation, system.n, error, distance, float(np.abs(limit).max()), fitted)
 
 
-def embedding_errors(counts: Sequence[int] = (1, 2, 3, 6), seed: int = 0) -> list[EmbeddingError]:
-    """The errors of both flawed formulations at a random state of arms of 1, 2, 3 and 6 links."""
-    rng = np.random.default_rng(seed)
-    errors = []
-    for n in counts:
+def embedding(links: Sequence[int] = (1, 2, 3, 6)) -> Part:
+    """The law of the embedding: torque error against dt, at a random state of an arm of each number of links."""
+    rng, laws = np.random.default_rng(0), list[EmbeddingError]()
+    for n in links:
         arm = planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())
         q, qd, qdd = rng.uniform(-1.0, 1.0, (3, n))
-        errors += [embedding_error(arm, q, qd, qdd, formulation) for formulation in ("by_definition", "kinetic_only")]
-    return errors
-
-
-def embedding(links: Sequence[int] = LINKS) -> Part:
-    """The law of the embedding: torque error against dt.  links: of the arms."""
-    laws = embedding_errors(links)
+        laws += [embedding_error(arm, q, qd, qdd, formulation) for formulation in ("by_definition", "kinetic_only")]
     header = ("formulation", "links", "slope", "largest entry of the limit [N m]", "error at dt = 1e-6 s [N m]")
     rows = [
         (
             TITLES[law.formulation],
             str(law.n),
-            f"{law.slope:.3f}" if np.isfinite(law.slope) else "exact",
-            f"{np.abs(law.limit).max():.4g}",
+            "exact" if law.slope is None else f"{law.slope:.3f}",
+            f"{law.limit:.4g}",
             f"{law.error[-1]:.4g}",
         )
         for law in laws
@@ -90,7 +77,7 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
     )
     most = max(laws, key=lambda law: law.error[-1])
     seen = (
-        f"Left, lines that stay level from dt = {laws[0].dt[0]:g} to {laws[0].dt[-1]:g} s, the highest {TITLES[most.formulation]} with "
+        f"Left, lines that stay level from dt = {STEPS[0]:g} to {STEPS[-1]:g} s, the highest {TITLES[most.formulation]} with "
         f"n = {most.n} at {most.error[-1]:.3g} N m. Right, lines that fall in parallel with one of slope 1."
     )
     blocks: list[Block] = [
@@ -106,13 +93,7 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
             "kinetic-only method accurate on three links (Table 1). Its program is not public: it may have done either."
         ),
     ]
-    data = {
-        f"{law.formulation} n={law.n}": {
-            "slope": law.slope if np.isfinite(law.slope) else None,
-            "limit": float(np.abs(law.limit).max()),
-        }
-        for law in laws
-    }
+    data = {f"{law.formulation} n={law.n}": {"slope": law.slope, "limit": law.limit} for law in laws}
     return Part("law", "Figure 8: why a smaller dt does not help", blocks, {"law": data})
 
 
@@ -122,13 +103,12 @@ def _panels(laws: Sequence[EmbeddingError]) -> list[PlotPanel]:
     panels = []
     for title, of in (("error of the torque", "error"), ("distance from its limit", "distance")):
         lines = [
-            Line(f"{TITLES[law.formulation]}, n = {law.n}", law.dt.tolist(), getattr(law, of).tolist(),
+            Line(f"{TITLES[law.formulation]}, n = {law.n}", STEPS, getattr(law, of),
                  COLORS[TITLES[law.formulation]], law.formulation == "kinetic_only")
             for law in laws
-            if getattr(law, of).min() > 0.0
+            if min(getattr(law, of)) > 0.0
         ]  # fmt: skip
         panels.append(PlotPanel(title, x, "largest |Δτ| [N m]", lines))
-    steps = laws[0].dt.tolist()
     top = 4.0 * max(max(line.y) for line in panels[1].lines)
-    panels[1].lines.append(Line("slope 1", steps, [top * dt / steps[0] for dt in steps], None))
+    panels[1].lines.append(Line("slope 1", STEPS, [top * dt / STEPS[0] for dt in STEPS], None))
     return panels

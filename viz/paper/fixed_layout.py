@@ -16,12 +16,8 @@ from ..graph_drawing.dot import short_formulas
 from ..graph_drawing.render import Size, positions
 from ..theme import Paint
 
-LETTER, LEAF, OPERATION, MARGIN = (
-    8.6,
-    30.0,
-    46.0,
-    18.0,
-)  # pixels: a letter's width, heights of shapes, room at the sides
+# Pixels: a letter's width, heights of shapes, room at the sides.
+LETTER, LEAF, OPERATION, MARGIN = 8.6, 30.0, 46.0, 18.0
 FONT, SMALL = 15, 13  # pixels
 _NUMBERED = re.compile(r"%[0-9]+")  # a node without a name in a formula
 OUTPUT, INPUT, NODE = "output", "input", "operation"
@@ -40,7 +36,7 @@ class Shape(NamedTuple):
     named: bool = True
 
     @property
-    def size(self) -> tuple[float, float]:
+    def size(self) -> Size:
         """Width and height in pixels."""
         room = LETTER * max(map(len, self.texts))
         return (max(44.0, room + 26.0), OPERATION) if self.kind == NODE else (max(34.0, room + 18.0), LEAF)
@@ -68,6 +64,7 @@ class View:
     wrong_edges: frozenset[Edge]
 
     def drawn(self) -> dict[str, int]:
+<<<<<<< HEAD
         """How many shapes and arrows of each kind the drawing has; wrong ones are among the others, outputs no nodes."""
         kinds = Counter([shape.kind for shape in self.shapes.values()])
         arrows = list(self.arrows.values())
@@ -80,6 +77,19 @@ class View:
             "output_arrows": sum([arrow.to_output for arrow in arrows]),
             "wrong_operations": sum([shape.paint == theme.MARKED for shape in self.shapes.values()]),
             "wrong_edges": sum([arrow.wrong and not arrow.to_output for arrow in arrows]),
+=======
+        """How many shapes and arrows of each kind the drawing has; wrong ones are among the others."""
+        kinds = [shape.kind for shape in self.shapes.values()]
+        to_outputs = [arrow.to_output for arrow in self.arrows.values()]
+        return {
+            "inputs": kinds.count(INPUT),
+            "operations": kinds.count(NODE),
+            "outputs": kinds.count(OUTPUT),
+            "edges": to_outputs.count(False),
+            "output_arrows": to_outputs.count(True),
+            "wrong_operations": len(self.wrong),
+            "wrong_edges": len(self.wrong_edges),
+>>>>>>> t-x2
         }
 
     def inputs_of_mistakes(self) -> list[str]:
@@ -136,6 +146,7 @@ def stage_svg(views: Mapping[str, View], shown: str) -> str:
 
     An element that looks the same in several views is one, with their names in `data-views`.
     """
+<<<<<<< HEAD
     centers, paths, size = _layout(list(views.values()))
     lines: dict[str, list[str]] = {}
     boxes: dict[str, list[str]] = {}
@@ -147,6 +158,22 @@ def stage_svg(views: Mapping[str, View], shown: str) -> str:
             boxes.setdefault(_box(place, shape, centers[place]), []).append(name)
     parts = [_in_views(inside, names, shown) for group in (lines, boxes) for inside, names in group.items()]
     width, height = size[0] + 2 * MARGIN, size[1]
+=======
+    centers, lines, (width, height) = _layout(list(views.values()))
+    arrows: dict[tuple[str, str], list[str]] = {}
+    boxes: dict[tuple[str, str], list[str]] = {}
+    for name, view in views.items():
+        for (source, target), arrow in view.arrows.items():
+            drawn = _arrow(lines[source, target], arrow, centers[target], view.shapes[target].size[1])
+            arrows.setdefault(drawn, []).append(name)
+        for place, shape in view.shapes.items():
+            boxes.setdefault(_box(place, shape, centers[place]), []).append(name)
+    parts = [
+        f'<g class="{kind}{" off" * (shown not in names)}" data-views="{" ".join(names)}"{rest}</g>'
+        for (kind, rest), names in (arrows | boxes).items()
+    ]
+    width += 2 * MARGIN
+>>>>>>> t-x2
     return (
         f'<svg viewBox="{-MARGIN:.0f} 0 {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}" '
         f'font-family="{theme.FONT_FAMILIES}" font-size="{FONT}" text-anchor="middle">{"".join(parts)}</svg>'
@@ -154,35 +181,42 @@ def stage_svg(views: Mapping[str, View], shown: str) -> str:
 
 
 def _layout(views: Sequence[View]) -> tuple[dict[str, Size], dict[tuple[str, str], str], Size]:
+<<<<<<< HEAD
     """Centers of the places of all views, each as large as its largest shape; lines between them; the size of all."""
     sizes: dict[str, tuple[float, float]] = {}
+=======
+    """Where the places of all views are, as wide and high as the largest shape at each; lines, and the whole size."""
+    sizes: dict[str, Size] = {}
+>>>>>>> t-x2
     for view in views:
         for place, shape in view.shapes.items():
             wide, high = sizes.get(place, (0.0, 0.0))
             sizes[place] = max(wide, shape.size[0]), max(high, shape.size[1])
     number = {place: i for i, place in enumerate(sizes)}
     pairs = list(dict.fromkeys([pair for view in views for pair in view.arrows]))
+<<<<<<< HEAD
     found = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])[0]
     centers = {place: found.centers[i] for place, i in number.items()}
     return centers, {(a, b): found.lines[number[a], number[b]] for a, b in pairs}, found.size
+=======
+    (found,) = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])
+    lines = {(a, b): found.lines[number[a], number[b]] for a, b in pairs}
+    return dict(zip(sizes, found.centers, strict=True)), lines, found.size
+>>>>>>> t-x2
 
 
-def _in_views(inside: str, names: Sequence[str], shown: str) -> str:
-    kind, rest = inside.split("|", 1)
-    off = "" if shown in names else " off"
-    return f'<g class="{kind}{off}" data-views="{" ".join(names)}"{rest}</g>'
-
-
-def _arrow(path: str, arrow: Arrow, target: tuple[tuple[float, float], tuple[float, float]]) -> str:
-    (x, y), (_, height) = target
+def _arrow(path: str, arrow: Arrow, target: Size, height: float) -> tuple[str, str]:
+    """Class and content of an arrow to a shape that is so high."""
+    x, y = target
     kind = " ".join(["arrow", *["wrong"] * arrow.wrong, *["to-output"] * arrow.to_output])
     start = float(path[1:].split(maxsplit=1)[0])
     side = -1.0 if start < x else 1.0  # below the shape, on the side that the argument comes from
     slot = f'<text x="{x + side * 26:.1f}" y="{y + height / 2 + 12:.1f}" font-size="{SMALL}">{arrow.slot}</text>'
-    return f'{kind}|><path d="{path}"/>{slot * bool(arrow.slot)}'
+    return kind, f'><path d="{path}"/>{slot * bool(arrow.slot)}'
 
 
-def _box(place: str, shape: Shape, center: tuple[float, float]) -> str:
+def _box(place: str, shape: Shape, center: Size) -> tuple[str, str]:
+    """Class and content of a shape."""
     (x, y), (w, h) = center, shape.size
     paint, box = shape.paint, f'x="{x - w / 2:.1f}" y="{y - h / 2:.1f}" width="{w:.1f}" height="{h:.1f}"'
     look = f'fill="{paint.fill}" stroke="{paint.line}"'
@@ -201,7 +235,7 @@ def _box(place: str, shape: Shape, center: tuple[float, float]) -> str:
         ]
     )
     kind = f"box {shape.kind}{' wrong' * (paint == theme.MARKED)}"
-    return f'{kind}|data-place="{escape(place)}">{outline}{texts}'.replace("|", "| ", 1)
+    return kind, f' data-place="{escape(place)}">{outline}{texts}'
 
 
 def subscripts(text: str) -> str:
@@ -213,12 +247,9 @@ def spoken(graph: Graph, names: Mapping[str, str]) -> str:
     """A graph in words: what goes in, and what each named node and each output is computed from."""
     called = Names(graph, names)
     inputs = ", ".join([called.shown(str(node.name)) for node in graph.nodes if not node.args])
-    named = [node for node in graph.nodes if node.args and node.name]
-    formulas = [f"{called.shown(str(node.name))} = {written(graph, node, names)}" for node in named]
-    formulas += [
-        f"{names.get(name, theme.pretty(name))} = {written(graph, node, names)}" for name, node in graph.outputs.items()
-    ]
-    return f"Inputs {inputs}. {'; '.join(formulas)}."
+    results = [(called.shown(str(node.name)), node) for node in graph.nodes if node.args and node.name]
+    results += [(names.get(name, theme.pretty(name)), node) for name, node in graph.outputs.items()]
+    return f"Inputs {inputs}. {'; '.join([f'{name} = {written(graph, node, names)}' for name, node in results])}."
 
 
 def written(graph: Graph, node: Node, names: Mapping[str, str]) -> str:

@@ -1,16 +1,12 @@
 """Equation (3) and Figures 1 to 3: one rotor on a spring, by the three formulations."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from cgraph import Graph
 from cgraph._shared import Json, Polynomial, expand, format_polynomial
 from dynamics import formulation_sizes, formulation_verdict, inverse_dynamics, momentum_rate, scenes
-from dynamics.equations.formulations.formulation_sizes import (
-    INERTIAL_TERM,
-    PAPER as FORMULATIONS,
-    blamed,
-)
+from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, PAPER as FORMULATIONS, blamed
 
 from .. import theme
 from ..graph_drawing.dot import plain_drawing
@@ -25,8 +21,6 @@ from .typeset import row, terms, typeset
 
 SCENE = "spring_mass"
 LETTERS = {**theme.ONE_JOINT, "q0_old": "θ_old", "qd0_old": "ω_old"}  # in a line of text
-
-
 # The paper's right-hand side, I qdd - k (qdd dt^2 + 2 qd dt + q_old), as coefficients.
 PAPER: Polynomial = {
     (("I", 1), ("qdd0", 1)): 1.0,
@@ -36,20 +30,12 @@ PAPER: Polynomial = {
 }
 
 
-@dataclass(frozen=True)
-class Equation:
-    """One formulation's d/dt dL/dqd for L = I qd^2/2 - k q^2/2, term by term."""
+def equation3(formulation: str) -> Polynomial:
+    """The terms of d/dt dL/dqd by that formulation, for L = I qd^2/2 - k q^2/2.
 
-    formulation: str
-    terms: Polynomial
-
-    def __str__(self) -> str:
-        return format_polynomial(self.terms)
-
-
-def equation3(formulation: str) -> Equation:
-    """The terms of the graph of that formulation; qd0 stands for the embedded velocity qdd0 dt + qd0_old."""
-    return Equation(formulation, _terms(momentum_rate(scenes.load(SCENE), formulation)))
+    qd0 stands for the embedded velocity qdd0 dt + qd0_old.
+    """
+    return _terms(momentum_rate(scenes.load(SCENE), formulation))
 
 
 def torque_terms(formulation: str, whole: Sequence[str] = ("qd0",)) -> Polynomial:
@@ -68,10 +54,11 @@ def _terms(graph: Graph, whole: Sequence[str] = ("qd0",)) -> Polynomial:
 
 def equations() -> Part:
     """Equation (3), read off the graphs term by term."""
-    forms = [equation3(name) for name in FORMULATIONS]
-    same = forms[0].terms == PAPER
+    forms = {name: equation3(name) for name in FORMULATIONS}
+    written = {name: format_polynomial(form) for name, form in forms.items()}
+    same = forms["by_definition"] == PAPER
     lines = [f"{'paper, Eq. (3)':16} d/dt dL/dqd = {format_polynomial(PAPER)}"]
-    lines += [f"{TITLES[form.formulation]:16} d/dt dL/dqd = {form}" for form in forms]
+    lines += [f"{TITLES[name]:16} d/dt dL/dqd = {form}" for name, form in written.items()]
     lines.append(f"By definition, the graph has the paper's terms, all of them and no other: {'yes' if same else 'NO'}")
     torques = {name: format_polynomial(torque_terms(name)) for name in FORMULATIONS}
     sums = {name: torque_terms(name, ("q0", "qd0")) for name in FORMULATIONS}
@@ -82,7 +69,7 @@ def equations() -> Part:
         "q0 is the paper's theta, qd0 its omega, qdd0 its alpha, q0_old the angle one step of length dt earlier.",
     ]
     blocks = [Markup(_equations_html(forms, sums, same), "\n".join(lines))]
-    data = {"equal_to_paper": same} | {form.formulation: str(form) for form in forms} | {"torques": torques}
+    data: dict[str, Json] = {"equal_to_paper": same, **written, "torques": torques}
     files = {"equations.txt": "\n".join(lines) + "\n"}
     return Part("equations", "Equation (3), read off the graphs", blocks, {"equations": data}, files)
 
@@ -94,13 +81,12 @@ PAPERS_LINE = (  # Eq. (3) as it is printed, its last line
 )
 
 
-def _equations_html(forms: list[Equation], torques: Mapping[str, Polynomial], same: bool) -> str:
+def _equations_html(forms: Mapping[str, Polynomial], torques: Mapping[str, Polynomial], same: bool) -> str:
     """The section's words and its table, with formulas."""
-    right, torque = forms[-1].terms, torques[FORMULATIONS[-1]]
+    right, torque = forms["chain_rule"], torques["chain_rule"]
     rows = [("the paper, Eq. (3), multiplied out", terms(PAPER, right), "")]
     rows += [
-        (f"{TITLES[form.formulation]}, our graph", terms(form.terms, right), terms(torques[form.formulation], torque))
-        for form in forms
+        (f"{TITLES[name]}, our graph", terms(form, right), terms(torques[name], torque)) for name, form in forms.items()
     ]
     body = "".join([f"<tr><td>{title}</td><td>{left}</td><td>{total}</td></tr>" for title, left, total in rows])
     rate = f"<math>{RATE}</math>"
@@ -155,10 +141,19 @@ def caption(name: str) -> str:
     """The caption of one of Figures 1 to 3, with the numbers of what is drawn."""
     formulation, what, seen = WORDS[name]
     shown = view(formulation)
+<<<<<<< HEAD
     alone = " and ".join([text.replace(" ", "_") for text in shown.inputs_of_mistakes()])
     counts = (
         "Drawn are {nodes} nodes, {inputs} inputs and {operations} operations, and {edges} edges; the {outputs} outputs in "
         "double frames are no nodes, and the {output_arrows} arrows to them no edges."
+=======
+    count = shown.drawn()
+    alone = " and ".join([text.replace(" ", "_") for text in shown.inputs_of_mistakes()])
+    return (
+        f"Figure {name[3:]}. {what} Drawn are {count['inputs'] + count['operations']} nodes, {count['inputs']} inputs and "
+        f"{count['operations']} operations, and {count['edges']} edges; the {count['outputs']} outputs in double frames are "
+        f"no nodes, and the {count['output_arrows']} arrows to them no edges. {seen.format(**count, alone=alone)}"
+>>>>>>> t-x2
     )
     return f"Figure {name[3:]}. {what} {f'{counts} {seen}'.format(**shown.drawn(), alone=alone)}"
 
@@ -191,26 +186,20 @@ def moving_figure() -> tuple[Stage, str]:
     return seen, f"{told} {limit}"
 
 
-def legend() -> str:
-    """What shapes, colors and arrows of Figures 1 to 3 mean, as SVG."""
-    graphs = [view(formulation).graph for formulation, _, _ in WORDS.values()]
-    wrong = view("by_definition").wrong
-    return to_adaptive(legend_svg(kinds_in(*graphs, marked=wrong), 1, notes=NOTES))
-
-
 def figures_1_to_3() -> Part:
     """Figures 1 to 3: the three formulations on one layout, and the sizes of these graphs and of the whole torque."""
     sizes = formulation_sizes(scenes.load(SCENE))
     figures = {name: sizes[INERTIAL_TERM, formulation]._asdict() for name, (formulation, _, _) in WORDS.items()}
     moving, told = moving_figure()
-    explained = Picture("legend", legend(), "Shapes, colors and arrows of Figures 1 to 3.", "auto")
+    graphs = [each.graph for each in moving.views.values()]
+    legend = legend_svg(kinds_in(*graphs, marked=moving.views["fig1"].wrong), 1, notes=NOTES)
+    explained = Picture("legend", to_adaptive(legend), "Shapes, colors and arrows of Figures 1 to 3.", "auto")
     blocks: list[Block] = [
         Markup(stage_html(moving, told, explained), "Figures 1 to 3 on one layout are on the page alone."),
         explained,
     ]
     files: dict[str, str | bytes] = {}
-    for name, (formulation, _, _) in WORDS.items():
-        seen = view(formulation)
+    for name, seen in moving.views.items():
         drawing = plain_drawing(seen.graph, theme.ONE_JOINT, seen.wrong, seen.wrong_edges)
         alt = f"Graph. {spoken(seen.graph, LETTERS)}"
         blocks.append(drawn(name, subscripts(render_svg(drawing)), caption(name), "auto", alt))

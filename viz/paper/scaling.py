@@ -40,13 +40,9 @@ class NodeScaling:
         return exponent(*zip(*kept, strict=True))
 
 
-def node_scaling(
-    counts: Sequence[int] = COUNTS, report: Callable[[float], None] = lambda done: None
-) -> list[NodeScaling]:
+def node_scaling(counts: Sequence[int], report: Callable[[float], None]) -> list[NodeScaling]:
     """Sizes of each formulation of `SCALED` over arms of `counts` links. report: called with the share done."""
-    rows = []
-    total = len(SCALED) * sum(n * n for n in counts)
-    done = 0
+    rows, done, total = [], 0, len(SCALED) * sum(n * n for n in counts)
     for formulation in SCALED:
         nodes, edges, micros = [], [], []
         for n in counts:
@@ -60,10 +56,10 @@ def node_scaling(
     return rows
 
 
-def _microseconds(graph: cg.Graph, repeats: int = 7) -> float:
+def _microseconds(graph: cg.Graph) -> float:
     function = cg.compile(graph, "python").values
     x = np.random.default_rng(0).normal(size=len(graph.inputs)).tolist()
-    tens = [spent(lambda: [function(x) for _ in range(10)]) for _ in range(repeats)]
+    tens = [spent(lambda: [function(x) for _ in range(10)]) for _ in range(7)]
     return min(each.seconds for each in tens) / 10.0 * 1e6
 
 
@@ -74,7 +70,17 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
     """
     with Progress("scaling", 1.0) as progress:
         rows = node_scaling(links, report=progress)
-    header, table = _exponents(rows, links[-1])
+    header = ["formulation", "nodes ~ n^p", "edges ~ n^p", "time ~ n^p", "edges", "edges at n = 3"]
+    table = [
+        [
+            TITLES[row.formulation],
+            *[f"{row.fitted(values):.2f}" for values in (row.nodes, row.edges, row.microseconds)],
+            _law_text(edge_law(row)),
+            str(row.edges[row.n.index(3)]),
+            str(row.edges[-1]),
+        ]
+        for row in rows
+    ]
     caption = (
         f"Figure 9. Inverse dynamics of chains of n equal rods, up to n = {links[-1]}; the paper's Section 4.2 expects O(n²) of the "
         f"embedding and O(n) of the chain rule. Exponents are fitted over n = {FITTED_FROM} to {links[-1]}, where the constant part "
@@ -92,7 +98,11 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
             caption,
             f"Curves of edges and of times over the number of links. At n = {links[-1]}: {seen}.",
         ),
-        Table(f"Growth with the number of links n; polynomials hold exactly from n = {EXACT_FROM} on", header, table),
+        Table(
+            f"Growth with the number of links n; polynomials hold exactly from n = {EXACT_FROM} on",
+            [*header, f"edges at n = {links[-1]}"],
+            table,
+        ),
     ]
     points = [
         (row.formulation, str(n), str(nodes), str(edges), f"{time:.3f}")
@@ -162,27 +172,3 @@ def _panels(rows: Sequence[NodeScaling]) -> list[PlotPanel]:
             lines.append(Line(f"slope {power}", links, [start * (n / links[0]) ** power for n in links], None))
         panels.append(PlotPanel(title, "links n", y, lines))
     return panels
-
-
-def _exponents(rows: Sequence[NodeScaling], longest: int) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """The table of fitted exponents: header and rows."""
-    header = (
-        "formulation",
-        "nodes ~ n^p",
-        "edges ~ n^p",
-        "time ~ n^p",
-        "edges",
-        "edges at n = 3",
-        f"edges at n = {longest}",
-    )
-    table = [
-        (
-            TITLES[row.formulation],
-            *(f"{row.fitted(values):.2f}" for values in (row.nodes, row.edges, row.microseconds)),
-            _law_text(edge_law(row)),
-            str(row.edges[row.n.index(3)]),
-            str(row.edges[-1]),
-        )
-        for row in rows
-    ]
-    return header, table

@@ -42,12 +42,8 @@ class Stage:
             }
             for name, view in self.views.items()
         }
-        return {
-            "steps": [_number(step) for step in self.steps],
-            "first": FIRST_STEP,
-            "views": views,
-            "compared": self._compared(),
-        }
+        steps = [_number(step) for step in self.steps]
+        return {"steps": steps, "first": FIRST_STEP, "views": views, "compared": self._compared()}
 
     def _nodes(self, view: View) -> dict[str, Json]:
         """{place: what a reader is told of it}, in the order of computation."""
@@ -73,11 +69,7 @@ class Stage:
         }
         *_, right = found.values()
         return [
-            [
-                name,
-                [_number(value) for value in values],
-                [_number(value - true) for value, true in zip(values, right, strict=True)],
-            ]
+            [name, [*map(_number, values)], [_number(a - b) for a, b in zip(values, right, strict=True)]]
             for name, values in found.items()
         ]
 
@@ -92,22 +84,14 @@ def _number(value: float) -> str:
 
 def stage_html(stage: Stage, told: str, legend: Picture) -> str:
     """The figure as HTML, for the page's style and script.  told: where its values are taken."""
-    (first, *_), views = stage.views, stage.views
-    buttons = "".join(
-        [
-            f'<label><input type="radio" name="view" value="{name}"{" checked" * (name == first)}>{escape(title)}</label>'
-            for name, title in stage.titles.items()
-        ]
-    )
-    rows = "".join(
-        [
-            f'<tr data-view="{name}"><td>{escape(title)}</td><td></td><td></td></tr>'
-            for name, title in stage.titles.items()
-        ]
-    )
+    first, buttons, rows = next(iter(stage.views)), "", ""
+    for name, title in stage.titles.items():
+        checked, words = " checked" * (name == first), escape(title)
+        buttons += f'<label><input type="radio" name="view" value="{name}"{checked}>{words}</label>'
+        rows += f'<tr data-view="{name}"><td>{words}</td><td></td><td></td></tr>'
     return (
         f'<figure class="stage"><fieldset><legend>Formulation</legend>{buttons}</fieldset>'
-        f'<div id="graph" role="group" aria-roledescription="graph">{stage_svg(views, first)}</div><div class="beside">'
+        f'<div id="graph" role="group" aria-roledescription="graph">{stage_svg(stage.views, first)}</div><div class="beside">'
         '<p id="told">Point at a node, or tap it, or walk through the graph with the arrow keys.</p>'
         f'<p class="step"><label for="dt">Step dt</label><input id="dt" type="range" min="0" max="{len(stage.steps) - 1}" '
         f'value="{FIRST_STEP}" step="1" aria-describedby="at"><output for="dt"></output></p>'

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,19 +20,13 @@ from ..plots import plot
 from .eager import eager_evaluations
 from .part import Part, plotted
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
 EVALUATIONS = 1000  # as in the paper
-
-
+PAPER = "the paper"  # among ways of evaluating
 # The paper's Table 1: mean and standard deviation over 1000 evaluations, in ms.
 PAPER_MS = {"by_definition": (51.7, 9.62), "kinetic_only": (43.8, 8.03), "chain_rule": (6.29, 1.15)}
 
 
-@dataclass(frozen=True)
-class Timing:
+class Timing(NamedTuple):
     """Median and quartiles of one evaluation, in microseconds: one interruption does not move them."""
 
     median: float
@@ -41,8 +34,7 @@ class Timing:
     upper: float  # a quarter take more
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One formulation: its graph's size and its cost by each way of evaluating it."""
 
     formulation: str
@@ -50,7 +42,7 @@ class Row:
     timings: dict[str, Timing]  # {"interpreted" | "compiled" | "PyTorch eager": ...}
 
 
-def table_1(evaluations: int = EVALUATIONS, seed: int = 0) -> list[Row]:
+def table_1(evaluations: int = EVALUATIONS) -> list[Row]:
     """The three formulations, each evaluated at random states; formulations take turns, so that drift is shared.
 
     PyTorch eager, which builds its graph anew at every evaluation, is measured beside ours where torch is installed.
@@ -63,7 +55,7 @@ def table_1(evaluations: int = EVALUATIONS, seed: int = 0) -> list[Row]:
     }
     if eager := eager_evaluations(scene.system, PAPER_MS):
         runs["PyTorch eager"] = eager
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     states = {
         name: np.where([x == "dt" for x in graph.input_names], 1e-3, rng.normal(size=(evaluations, len(graph.inputs))))
         for name, graph in graphs.items()
@@ -77,13 +69,8 @@ def table_1(evaluations: int = EVALUATIONS, seed: int = 0) -> list[Row]:
             for name, function in functions.items():
                 seconds[name].append(spent(partial(function, states[name][k])).seconds)
         for name, taken in seconds.items():
-            timings[name][way] = timing(np.array(taken))
+            timings[name][way] = Timing(*[float(share) * 1e6 for share in np.quantile(taken, (0.5, 0.25, 0.75))])
     return [Row(name, graph.counts(), timings[name]) for name, graph in graphs.items()]
-
-
-def timing(seconds: np.ndarray) -> Timing:
-    """The median and quartiles of times [s]."""
-    return Timing(*[float(share) * 1e6 for share in np.quantile(seconds, (0.5, 0.25, 0.75))])
 
 
 def _interpreted(graph: cg.Graph) -> Callable[[np.ndarray], object]:
@@ -102,16 +89,15 @@ def figure6(evaluations: int = EVALUATIONS) -> Part:
         f"{evaluations} random states, with lines from the lower to the upper quartile. On the right the paper's own (Section 4.2): "
         "means with one standard deviation."
     )
-    ratios = {TITLES[row.formulation]: _to_chain_rule(rows, "compiled")[TITLES[row.formulation]][0] for row in rows}
-    seen = ", ".join([f"{name} {ratio:.2f}" for name, ratio in ratios.items()])
-    papers = ", ".join(
-        [f"{TITLES[name]} {mean / PAPER_MS['chain_rule'][0]:.2f}" for name, (mean, _) in PAPER_MS.items()]
+    ratios = _ratios(rows)
+    seen, papers = (
+        ", ".join([f"{name} {ratio:.2f}" for name, (ratio, *_) in ratios[way].items()]) for way in ("compiled", PAPER)
     )
     alt = f"Bars of three formulations for each way of evaluating. Compiled: {seen}. The paper: {papers}."
     blocks: list[Block] = [
-        Table("Table 1: ratios of medians to the chain rule's, and sizes", *_ratios(rows), file="table1"),
+        Table("Table 1: ratios of medians to the chain rule's, and sizes", *_table(rows, ratios), file="table1"),
         Paragraph(_why(rows), point=True),
-        plotted("fig6", _bars(rows), caption, alt),
+        plotted("fig6", plot.bars(ratios, COLORS, "time, chain rule = 1"), caption, alt),
         Table("Times of one evaluation", *_times(rows), folded=True, file="table1-times"),
         Paragraph(
             "Interpreted: node by node in Python. Compiled: one generated Python function. PyTorch eager, measured where torch "
@@ -124,35 +110,25 @@ def figure6(evaluations: int = EVALUATIONS) -> Part:
     return Part("table1", "Figure 6 and Table 1: the time of an evaluation", blocks, {"table1": data})
 
 
-def _bars(rows: Sequence[Row]) -> Figure:
-    """A panel for each way of evaluating, and one for the paper's own times."""
-    panels = {way: _to_chain_rule(rows, way) for way in rows[0].timings}
-    chain = PAPER_MS["chain_rule"][0]
-    panels["the paper"] = {
-        TITLES[name]: (mean / chain, (mean - sd) / chain, (mean + sd) / chain) for name, (mean, sd) in PAPER_MS.items()
+def _ratios(rows: Sequence[Row]) -> dict[str, dict[str, Timing]]:
+    """{way of evaluating, the paper's the last: {formulation: its times by the median of the chain rule}}."""
+    times = {way: {TITLES[row.formulation]: row.timings[way] for row in rows} for way in rows[0].timings}
+    times[PAPER] = {TITLES[name]: Timing(mean, mean - sd, mean + sd) for name, (mean, sd) in PAPER_MS.items()}
+    return {
+        way: {name: Timing(*[time / each[TITLES["chain_rule"]].median for time in row]) for name, row in each.items()}
+        for way, each in times.items()
     }
-    return plot.bars(panels, COLORS, "time, chain rule = 1")
 
 
-def _to_chain_rule(rows: Sequence[Row], way: str) -> dict[str, tuple[float, float, float]]:
-    """{formulation: median, lower and upper quartile by the median of the chain rule, the last row}."""
-    times = {TITLES[row.formulation]: row.timings[way] for row in rows}
-    chain = rows[-1].timings[way].median
-    return {name: (t.median / chain, t.lower / chain, t.upper / chain) for name, t in times.items()}
-
-
-def _ratios(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Table 1: header and rows; ratios are of medians, to the chain rule's, which is the last row."""
-    ways = list(rows[0].timings)
-    base = {way: rows[-1].timings[way].median for way in ways}
-    header = ("formulation", *(f"{way}, ratio" for way in ways), "paper, ratio", "nodes", "edges", "depth")
+def _table(rows: Sequence[Row], ratios: Mapping[str, Mapping[str, Timing]]) -> tuple[list[str], list[list[str]]]:
+    """Table 1: header and rows; ratios are of medians."""
+    header = ["formulation", *[f"{way.removeprefix('the ')}, ratio" for way in ratios], "nodes", "edges", "depth"]
     table = [
-        (
+        [
             TITLES[row.formulation],
-            *(f"{row.timings[way].median / base[way]:.2f}" for way in ways),
-            f"{PAPER_MS[row.formulation][0] / PAPER_MS['chain_rule'][0]:.2f}",
-            *(str(count) for count in (row.counts.nodes, row.counts.edges, row.counts.depth)),
-        )
+            *[f"{each[TITLES[row.formulation]].median:.2f}" for each in ratios.values()],
+            *[str(count) for count in (row.counts.nodes, row.counts.edges, row.counts.depth)],
+        ]
         for row in rows
     ]
     return header, table
@@ -162,7 +138,7 @@ def _times(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]
     """The times: header and a row for each way of evaluating each formulation; the paper's are of another machine."""
     header = ("formulation", "evaluated", "median", "lower quartile", "upper quartile", "unit")
     table = [
-        (TITLES[row.formulation], way, *(f"{time:.3g}" for time in (timing.median, timing.lower, timing.upper)), "µs")
+        (TITLES[row.formulation], way, *[f"{time:.3g}" for time in timing], "µs")
         for row in rows
         for way, timing in row.timings.items()
     ]
