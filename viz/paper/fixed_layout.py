@@ -1,7 +1,6 @@
 """Several graphs of the same quantities on one layout: what they share stays where it is, and each shows its own part."""
 
 import re
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -64,20 +63,6 @@ class View:
     wrong_edges: frozenset[Edge]
 
     def drawn(self) -> dict[str, int]:
-<<<<<<< HEAD
-        """How many shapes and arrows of each kind the drawing has; wrong ones are among the others, outputs no nodes."""
-        kinds = Counter([shape.kind for shape in self.shapes.values()])
-        arrows = list(self.arrows.values())
-        return {
-            "nodes": kinds[INPUT] + kinds[NODE],
-            "inputs": kinds[INPUT],
-            "operations": kinds[NODE],
-            "outputs": kinds[OUTPUT],
-            "edges": sum([not arrow.to_output for arrow in arrows]),
-            "output_arrows": sum([arrow.to_output for arrow in arrows]),
-            "wrong_operations": sum([shape.paint == theme.MARKED for shape in self.shapes.values()]),
-            "wrong_edges": sum([arrow.wrong and not arrow.to_output for arrow in arrows]),
-=======
         """How many shapes and arrows of each kind the drawing has; wrong ones are among the others."""
         kinds = [shape.kind for shape in self.shapes.values()]
         to_outputs = [arrow.to_output for arrow in self.arrows.values()]
@@ -89,7 +74,6 @@ class View:
             "output_arrows": to_outputs.count(True),
             "wrong_operations": len(self.wrong),
             "wrong_edges": len(self.wrong_edges),
->>>>>>> t-x2
         }
 
     def inputs_of_mistakes(self) -> list[str]:
@@ -146,19 +130,6 @@ def stage_svg(views: Mapping[str, View], shown: str) -> str:
 
     An element that looks the same in several views is one, with their names in `data-views`.
     """
-<<<<<<< HEAD
-    centers, paths, size = _layout(list(views.values()))
-    lines: dict[str, list[str]] = {}
-    boxes: dict[str, list[str]] = {}
-    for name, view in views.items():
-        for (source, target), arrow in view.arrows.items():
-            middle = centers[target], view.shapes[target].size
-            lines.setdefault(_arrow(paths[source, target], arrow, middle), []).append(name)
-        for place, shape in view.shapes.items():
-            boxes.setdefault(_box(place, shape, centers[place]), []).append(name)
-    parts = [_in_views(inside, names, shown) for group in (lines, boxes) for inside, names in group.items()]
-    width, height = size[0] + 2 * MARGIN, size[1]
-=======
     centers, lines, (width, height) = _layout(list(views.values()))
     arrows: dict[tuple[str, str], list[str]] = {}
     boxes: dict[tuple[str, str], list[str]] = {}
@@ -173,7 +144,6 @@ def stage_svg(views: Mapping[str, View], shown: str) -> str:
         for (kind, rest), names in (arrows | boxes).items()
     ]
     width += 2 * MARGIN
->>>>>>> t-x2
     return (
         f'<svg viewBox="{-MARGIN:.0f} 0 {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}" '
         f'font-family="{theme.FONT_FAMILIES}" font-size="{FONT}" text-anchor="middle">{"".join(parts)}</svg>'
@@ -181,28 +151,17 @@ def stage_svg(views: Mapping[str, View], shown: str) -> str:
 
 
 def _layout(views: Sequence[View]) -> tuple[dict[str, Size], dict[tuple[str, str], str], Size]:
-<<<<<<< HEAD
-    """Centers of the places of all views, each as large as its largest shape; lines between them; the size of all."""
-    sizes: dict[str, tuple[float, float]] = {}
-=======
     """Where the places of all views are, as wide and high as the largest shape at each; lines, and the whole size."""
     sizes: dict[str, Size] = {}
->>>>>>> t-x2
     for view in views:
         for place, shape in view.shapes.items():
             wide, high = sizes.get(place, (0.0, 0.0))
             sizes[place] = max(wide, shape.size[0]), max(high, shape.size[1])
     number = {place: i for i, place in enumerate(sizes)}
     pairs = list(dict.fromkeys([pair for view in views for pair in view.arrows]))
-<<<<<<< HEAD
-    found = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])[0]
-    centers = {place: found.centers[i] for place, i in number.items()}
-    return centers, {(a, b): found.lines[number[a], number[b]] for a, b in pairs}, found.size
-=======
     (found,) = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])
     lines = {(a, b): found.lines[number[a], number[b]] for a, b in pairs}
     return dict(zip(sizes, found.centers, strict=True)), lines, found.size
->>>>>>> t-x2
 
 
 def _arrow(path: str, arrow: Arrow, target: Size, height: float) -> tuple[str, str]:

@@ -141,21 +141,13 @@ def caption(name: str) -> str:
     """The caption of one of Figures 1 to 3, with the numbers of what is drawn."""
     formulation, what, seen = WORDS[name]
     shown = view(formulation)
-<<<<<<< HEAD
-    alone = " and ".join([text.replace(" ", "_") for text in shown.inputs_of_mistakes()])
-    counts = (
-        "Drawn are {nodes} nodes, {inputs} inputs and {operations} operations, and {edges} edges; the {outputs} outputs in "
-        "double frames are no nodes, and the {output_arrows} arrows to them no edges."
-=======
     count = shown.drawn()
     alone = " and ".join([text.replace(" ", "_") for text in shown.inputs_of_mistakes()])
     return (
         f"Figure {name[3:]}. {what} Drawn are {count['inputs'] + count['operations']} nodes, {count['inputs']} inputs and "
         f"{count['operations']} operations, and {count['edges']} edges; the {count['outputs']} outputs in double frames are "
         f"no nodes, and the {count['output_arrows']} arrows to them no edges. {seen.format(**count, alone=alone)}"
->>>>>>> t-x2
     )
-    return f"Figure {name[3:]}. {what} {f'{counts} {seen}'.format(**shown.drawn(), alone=alone)}"
 
 
 STATE = {"q0": 0.5, "qd0": 1.0, "qdd0": 4.0, "I": 2.0, "k": 3.0}  # rad, rad/s, rad/s^2, kg m^2, N m/rad
