@@ -90,6 +90,8 @@ class Stepper(ABC):
         self._wish = 0.0
         self.largest, self.warnings, self._is_stiff, self._is_told = 0.0, list[str](), False, False
         self._is_unsure = False
+        if self.modes is not None:
+            self.modes.turns.clear()
         self.status = self.event = ""
         self.log = None if self.events is None else EventLog(self.events)
 
