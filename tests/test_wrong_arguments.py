@@ -396,6 +396,7 @@ CALLS |= {
     "extend.compressed_jacobian": call(extend.compressed_jacobian, GRAPH, None),
     "extend.jets": call(extend.jets, GRAPH, "t", exact=False),
     "extend.straight": call(extend.straight, extend.jets(GRAPH), 2),
+    "extend.enclosure": call(extend.enclosure, GRAPH, []),
     "extend.cotangents": call(extend.cotangents, {X * Y: ONE}, [X, Y], None, fixed=(), through={}, zero_wins=False),
     "extend.folded": call(extend.folded, [X * Y], extend.Builder(), {X: Y}),
     "extend.hessian_nodes": call(extend.hessian_nodes, X * Y, [X, Y], None),
