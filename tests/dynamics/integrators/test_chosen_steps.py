@@ -96,15 +96,6 @@ def test_an_initial_layer_is_followed(method: str, rate: float) -> None:
 
 
 @mark.parametrize("method", EXPLICIT)
-def test_stiffness_is_said(method: str) -> None:
-    system = first_order(lambda x, t: -1e5 * (x[0] - cg.cos(t)))
-    with pytest.warns(dyn.SimulationWarning, match="the system is stiff: .*method='radau'"):
-        run = dyn.simulate(system, [1.0], None, 0.1, method)
-    assert run.stats.success
-    assert len(run.stats.warnings) == 1
-
-
-@mark.parametrize("method", EXPLICIT)
 def test_a_system_that_is_not_stiff_is_not_called_so(method: str) -> None:
     arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
     for rtol in (1e-3, 1e-12):
