@@ -70,18 +70,6 @@ def test_the_clock_makes_the_steps_of_the_state(method: str, t_end: float) -> No
     assert t[-1] == t_end
 
 
-@mark.parametrize("method", ADAPTIVE)
-@mark.parametrize("unit", [*slow(2.0**-30, 2.0**30), 2.0**-400])
-def test_the_unit_of_time_changes_no_count_of_steps(method: str, unit: float) -> None:
-    def run(unit: float) -> dyn.Trajectory:
-        system = first_order(lambda x, t: x[1] / unit, lambda x, t: -cg.sin(x[0]) / unit)
-        return dyn.simulate(system, [1.0, 0.0], None, 5.0 * unit, method)
-
-    plain, scaled = run(1.0), run(unit)
-    assert (plain.stats.steps, plain.stats.rejected) == (scaled.stats.steps, scaled.stats.rejected)
-    assert np.array_equal(plain.q, scaled.q)
-
-
 @mark.parametrize("method", STIFF)
 @mark.parametrize("rate", [1e3, 1e8, 1e13])
 def test_an_initial_layer_is_followed(method: str, rate: float) -> None:

@@ -108,7 +108,6 @@ def test_the_numbers_of_radau() -> None:
     assert block[1:, 0] == approx(0.0, abs=INVERTED)
     assert block[1, 1] == approx(block[2, 2], rel=INVERTED)
     assert block[1, 2] == approx(-block[2, 1], rel=INVERTED)
-    assert np.array(_POWERS).T @ [c, c**2, c**3] == approx(np.array(_POWERS).T @ [c, c**2, c**3])
     for power in range(3):  # the polynomial through Z = s^(power + 1) is that power
         assert np.array(_POWERS) @ c ** (power + 1) == approx(np.eye(3)[power], abs=10.0 * INVERTED)
 
