@@ -200,11 +200,6 @@ def test_what_cannot_be_is_refused_by_name(bodies: Any, message: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_gravity_is_a_finite_vector() -> None:
-    with raises(MechanismError, match=re.escape("gravity must be (3,) finite numbers, got 9.81")):
-        Mechanism([point("a")], gravity=9.81)
-
-
 @mark.parametrize("bodies", [[], [Body("a", Joint("fixed"), mass=1.0)]])
 def test_a_system_needs_a_joint_that_moves(bodies: list[Body]) -> None:
     with raises(MechanismError, match="the mechanism has no joint that moves"):
