@@ -184,16 +184,3 @@ def test_integer_powers_of_negative_numbers_have_derivatives(exponent):
         for order, name in enumerate(("first", "second"), 1):
             expected = float(high_precision.partial(lambda x: x ** int(exponent), [base], [order]))
             assert found[name] == pytest.approx([expected] * len(found[name]), rel=TOLERANCE)
-
-
-@each_row("point", [(0.0, 0.0, 0.0), (0.0, 2.0, 3.0), (0.0, 0.0, 3.0), (2.0, 0.0, 3.0)])
-def test_products_with_zeros_have_exact_derivatives(point):
-    x, y, z = point
-    product = derivatives(lambda x, y, z: x * y * z, *point)
-    assert product["first"] == [y * z] * 3
-    assert product["second"] == [0.0] * 6
-    square = derivatives(lambda x, y, z: x * y * x * z, *point)
-    assert square["first"] == [2 * x * y * z] * 3
-    assert square["second"] == [2 * y * z] * 6
-    quotient = derivatives(lambda x, y, z: x * y / (z + 1), *point)
-    assert quotient["first"] == [y / (z + 1)] * 3

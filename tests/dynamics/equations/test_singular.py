@@ -96,13 +96,6 @@ def test_the_first_of_thirty_that_fails_is_named_in_a_batch_with_its_state():
         assert system.coordinates[int(run(column)[-1]) - 1] == f"bead {name[1:]}"
 
 
-def test_a_coordinate_without_inertia_is_an_error_at_once():
-    system = dyn.System(lambda q, qd, t: 0.5 * qd[0] * qd[0] - qd[1] * qd[1], ["good", "bad"])
-    assert len(forward_dynamics(system).outputs) == 2
-    with pytest.raises(SingularMassMatrixError, match="not positive definite: coordinate 'bad'"):
-        forward_dynamics(system, check=True)
-
-
 def quadratic(rng: np.random.Generator, unit: np.ndarray, signs: list[float]) -> dyn.System:
     """L = sum of sign_k z_k^2 / 2 with as many random velocities z_k(q, qd), the coordinates in these units."""
     n = len(unit)

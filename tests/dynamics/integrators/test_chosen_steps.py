@@ -70,18 +70,6 @@ def test_the_clock_makes_the_steps_of_the_state(method: str, t_end: float) -> No
     assert t[-1] == t_end
 
 
-@mark.parametrize("method", ADAPTIVE)
-@mark.parametrize("unit", [*slow(2.0**-30, 2.0**30), 2.0**-400])
-def test_the_unit_of_time_changes_no_count_of_steps(method: str, unit: float) -> None:
-    def run(unit: float) -> dyn.Trajectory:
-        system = first_order(lambda x, t: x[1] / unit, lambda x, t: -cg.sin(x[0]) / unit)
-        return dyn.simulate(system, [1.0, 0.0], None, 5.0 * unit, method)
-
-    plain, scaled = run(1.0), run(unit)
-    assert (plain.stats.steps, plain.stats.rejected) == (scaled.stats.steps, scaled.stats.rejected)
-    assert np.array_equal(plain.q, scaled.q)
-
-
 @mark.parametrize("method", STIFF)
 @mark.parametrize("rate", [1e3, 1e8, 1e13])
 def test_an_initial_layer_is_followed(method: str, rate: float) -> None:
@@ -93,15 +81,6 @@ def test_an_initial_layer_is_followed(method: str, rate: float) -> None:
     exact = slow * np.exp(-times) + (2.0 - slow) * np.exp(-rate * times)
     assert run.q[:, 0] == approx(exact, abs=FOLLOWED)
     assert dyn.simulate(system, [rate / (rate - 1.0), 1.0], None, 1.0, method).stats.steps < 150
-
-
-@mark.parametrize("method", EXPLICIT)
-def test_stiffness_is_said(method: str) -> None:
-    system = first_order(lambda x, t: -1e5 * (x[0] - cg.cos(t)))
-    with pytest.warns(dyn.SimulationWarning, match="the system is stiff: .*method='radau'"):
-        run = dyn.simulate(system, [1.0], None, 0.1, method)
-    assert run.stats.success
-    assert len(run.stats.warnings) == 1
 
 
 @mark.parametrize("method", EXPLICIT)

@@ -150,15 +150,6 @@ def test_friction_brings_a_body_to_rest_in_the_time_of_dry_friction() -> None:
         assert (run.forces * run.qd <= 0.0).all()
 
 
-@mark.parametrize(("method", "dt"), [("dop853", None), ("radau", None), ("rk4", 0.01)])
-def test_friction_sticks_until_the_load_is_more(method: str, dt: float | None) -> None:
-    """Pulled by 2 t from rest, a cart of 2 kg breaks away at t = 2, as loss is 4, and is at (t - 2)^3 / 6."""
-    model = cart(dyn.JointFriction("cart", 4.0))
-    run = dyn.simulate(model, [0.0], [0.0], 3.0, method, dt=dt, tau=lambda q, qd, t: [2.0 * t], t_eval=[1.9, 3.0])
-    assert run.q[:, 0] == approx([0.0, 1.0 / 6.0], abs=RUN_ERROR)
-    assert run.qd[:, 0] == approx([0.0, 0.5], abs=RUN_ERROR)
-
-
 def test_joint_forces_go_with_their_bodies() -> None:
     arm = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
     servo = dyn.Actuator("link 2", "target", gain=(9.0, 0.0, 0.0), bias=(0.0, -9.0, 0.0))

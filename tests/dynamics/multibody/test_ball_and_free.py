@@ -58,8 +58,6 @@ def test_the_length_of_a_quaternion_has_no_part_in_anything() -> None:
 
 
 def test_what_joints_of_several_freedoms_cannot_have_is_said() -> None:
-    with raises(dyn.MechanismError, match=r"a joint of the kind 'free' has no spring, got stiffness 1.0"):
-        _ = dyn.Mechanism([dyn.Body("b", dyn.Joint("free", stiffness=1.0), inertia=(1.0, 1.0, 1.0))]).coordinates
     turning = dyn.Mechanism([dyn.Body("b", dyn.Joint("ball"), mass=1.0, inertia=(1.0, 1.0, 1.0)),
                              dyn.Body("c", dyn.Joint("revolute"), "b", inertia=(1.0, 1.0, 1.0))])  # fmt: skip
     assert turning.coordinates == ("b.qw", "b.qx", "b.qy", "b.qz", "c")

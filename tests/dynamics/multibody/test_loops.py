@@ -152,7 +152,6 @@ def node_count(n: int) -> int:
 def test_a_pinned_chain_grows_linearly() -> None:
     counts = [node_count(n) for n in (3, 4, 10, 16)]
     assert counts == [257, 395, 1229, 2063]
-    assert [counts[0] <= 270, counts[2] <= 1290] == [True, True]
 
 
 def test_andrews_squeezer_has_the_published_accelerations_forces_and_motion() -> None:

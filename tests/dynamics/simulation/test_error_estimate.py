@@ -194,19 +194,6 @@ def in_silence(*arguments: Any, **options: Any) -> dyn.Trajectory:
         return dyn.simulate(*arguments, **options)
 
 
-@mark.parametrize("method", ["midpoint", *slow("rk4", "verlet", "gauss4")])
-def test_a_kink_that_is_not_passed_is_no_error(method: str) -> None:
-    """One that is nowhere near, and one at which a coordinate is at rest."""
-    options: dict[str, Any] = {"dt": 0.01, "rtol": LOOSE}
-    plain = dyn.simulate(spring(), [1.0], [0.0], 10.0, method, **options).stats.error
-    aside = of(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * cg.abs(q[0] + 2.0) * q[0] ** 2 / (q[0] + 2.0))
-    assert dyn.simulate(aside, [1.0], [0.0], 10.0, method, **options).stats.error == approx(plain, rel=0.1)
-    two = dyn.System(
-        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 0.5 * q[0] ** 2 - cg.abs(q[1]), ["x", "at rest"]
-    )
-    assert dyn.simulate(two, [1.0, 0.0], [0.0, 0.0], 10.0, method, **options).stats.error == approx(plain, rel=0.1)
-
-
 TURNS: list[Any] = [
     lambda t: cg.maximum(t - 0.6, 0.0),
     lambda t: cg.minimum(0.6, t),

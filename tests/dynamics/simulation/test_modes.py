@@ -134,3 +134,9 @@ def test_independent_stops_at_an_instant_have_slopes_and_others_are_said() -> No
     assert found["qd"][-1, :2] == approx(np.eye(2), abs=1e-9)  # x = v^2 / 2
     with raises(ValueError, match=r"cross zero at one instant, t = 2\.25 s, and one hastens the other"):
         dyn.sensitivities(stops(0.5), [0.0, 0.0], [1.5, 1.5], 3.0, wrt="qd")
+
+
+def test_a_mass_at_rest_in_the_fold_of_its_potential_stays() -> None:
+    folded = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - cg.abs(q[0]), ["x"])
+    for method in ("dop853", "rk4"):
+        assert not dyn.simulate(folded, [0.0], [0.0], 10.0, method).q.any()

@@ -17,11 +17,11 @@ PARABOLA = 1e-9  # m and s: every method is exact on a parabola, to its toleranc
 METHOD_KINDS = ["dop853", "rk4", "verlet", "rodas"]
 
 
-def bounce(e: float, floor: float = 0.0, direction: int = -1) -> dyn.Event:
-    return dyn.Event("bounce", lambda q, qd, t: q[0] - floor, direction, reset=lambda q, qd, t: (q, [-e * qd[0]]))
+def bounce(e: float, floor: float = 0.0) -> dyn.Event:
+    return dyn.Event("bounce", lambda q, qd, t: q[0] - floor, -1, reset=lambda q, qd, t: (q, [-e * qd[0]]))
 
 
-def fall(event: dyn.Event | list[dyn.Event], t_end: float, method: str = "dop853", **options: Any) -> dyn.Trajectory:
+def fall(event: dyn.Event, t_end: float, method: str = "dop853", **options: Any) -> dyn.Trajectory:
     steps = {"dt": 0.05} if not METHODS[method].adaptive else {"rtol": 1e-11, "atol": 1e-11}
     return dyn.simulate(BALL, [1.0], [0.0], t_end, method, events=event, **{**steps, **options})
 
@@ -64,19 +64,9 @@ def test_infinitely_many_bounces_end_with_a_sentence_above_the_floor(method: str
     assert run.q.min() > floor - PARABOLA
 
 
-def test_touches_crossings_of_both_directions_and_several_resets_at_once() -> None:
-    run = fall(bounce(1.0, direction=0), 3.0)
-    assert run.events["bounce"].t == approx(FALL * np.array([1.0, 3.0, 5.0]), abs=1e-7)
-    kick = dyn.Event("kick", lambda q, qd, t: q[0] - 0.5, 0, reset=lambda q, qd, t: (q, [qd[0] - 1.0]))
-    v = -math.sqrt(G)
-    assert fall(kick, 0.4).events["kick"].qd[:, 0] == approx([v], abs=1e-7)  # goes on through, and counts once
-    corner = [
-        bounce(1.0),
-        dyn.Event("also", lambda q, qd, t: 2.0 * q[0], -1, reset=lambda q, qd, t: (q, [0.5 * qd[0]])),
-    ]
-    run = fall(corner, 0.6)
-    assert [len(crossings.t) for crossings in run.events.values()] == [1, 0]  # the first one has turned it back
-    assert run.qd[np.flatnonzero(np.diff(run.t) == 0.0) + 1, 0] == approx([G * FALL], abs=1e-7)
+def test_a_crossing_that_its_reset_does_not_turn_back_counts_once() -> None:
+    kick = dyn.Event("kick", lambda q, qd, t: q[0] - 0.5, reset=lambda q, qd, t: (q, [qd[0] - 1.0]))
+    assert fall(kick, 0.4).events["kick"].qd[:, 0] == approx([-math.sqrt(G)], abs=1e-7)
 
 
 @stops

@@ -27,7 +27,7 @@ def cart_pole(length: float, second: float) -> dyn.System:
     return dyn.System(lagrangian, ["x", "angle"])
 
 
-UNITS = ((2.0**-20, 2.0**30),)
+UNITS = ((2.0**-20, 2.0**30), (1.0, 2.0**-400))
 MORE_UNITS = ((2.0**40, 1.0), (2.0**-40, 1.0), (1.0, 2.0**-30))
 
 
