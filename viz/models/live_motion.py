@@ -22,7 +22,6 @@ from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.integrators import TABLEAUS
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.multibody.trees.joint_positions import contact_surfaces, drawn_points, view
-from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.simulation.simulate import simulate
@@ -131,8 +130,30 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
 
 
 def adjustable(scene: Scene) -> Scene:
-    """The scene that the page computes: of a small mechanism without parameters, masses and gravity are some."""
-    return scene if scene.mechanism is None else replace(scene, model=_adjustable(scene.mechanism))
+    """The scene that the page computes.
+
+    Of a small mechanism without parameters, masses, with inertias in proportion, and the size of gravity are some.
+    """
+    mechanism = scene.mechanism
+    if mechanism is None:
+        return scene
+    numbers = [*[body.mass for body in mechanism.bodies], *np.ravel(np.array(mechanism.gravity, dtype=object))]
+    if mechanism.parameters or len(mechanism.moving) > MOST_BODIES or not all(map(_is_number, numbers)):
+        return replace(scene, model=mechanism)
+    gravity = np.array(mechanism.gravity, dtype=np.float64)
+    size = float(np.linalg.norm(gravity))
+    bodies, parameters = [], {"g": size} if size else {}
+    for body in mechanism.bodies:
+        inertia = np.array(body.inertia, dtype=object)
+        name = f"mass.{'_'.join(body.name.split())}"
+        if body.mass and name not in parameters and all(map(_is_number, inertia.ravel())):
+            mass, parameters[name] = cg.variable(name), float(body.mass)
+            scaled = [[each and each / body.mass * mass for each in row] for row in np.atleast_2d(inertia)]
+            body = replace(body, mass=mass, inertia=scaled if inertia.ndim == 2 else scaled[0])
+        bodies.append(body)
+    down = [float(part / size) * cg.variable("g") if part else 0.0 for part in gravity]
+    made = replace(mechanism, bodies=bodies, gravity=down if size else mechanism.gravity, parameters=parameters)
+    return replace(scene, model=made)
 
 
 def _limits(scene: Scene) -> dict[str, tuple[float, float]]:
@@ -152,26 +173,6 @@ def _first_order(scene: Scene) -> Live:
     start = {name: float(values.get(name, 0.0)) for name in rate.input_names}  # the time is 0
     meters = [(f"d {name}/dt", "", "rate") for name in scene.coordinates]
     return Live(rate, start, rate, meters, dt=_step(scene), methods=TABLEAUS, units={"t": "s"})
-
-
-def _adjustable(mechanism: Mechanism) -> Mechanism:
-    """The mechanism, with its masses (inertias in proportion) and the size of gravity as parameters."""
-    numbers = [*[body.mass for body in mechanism.bodies], *np.ravel(np.array(mechanism.gravity, dtype=object))]
-    if mechanism.parameters or len(mechanism.moving) > MOST_BODIES or not all(map(_is_number, numbers)):
-        return mechanism
-    gravity = np.array(mechanism.gravity, dtype=np.float64)
-    size = float(np.linalg.norm(gravity))
-    bodies, parameters = [], {"g": size} if size else {}
-    for body in mechanism.bodies:
-        inertia = np.array(body.inertia, dtype=object)
-        name = f"mass.{'_'.join(body.name.split())}"
-        if body.mass and name not in parameters and all(map(_is_number, inertia.ravel())):
-            mass, parameters[name] = cg.variable(name), float(body.mass)
-            scaled = [[each and each / body.mass * mass for each in row] for row in np.atleast_2d(inertia)]
-            body = replace(body, mass=mass, inertia=scaled if inertia.ndim == 2 else scaled[0])
-        bodies.append(body)
-    down = [float(part / size) * cg.variable("g") if part else 0.0 for part in gravity]
-    return replace(mechanism, bodies=bodies, gravity=down if size else mechanism.gravity, parameters=parameters)
 
 
 def _is_number(value: object) -> bool:
