@@ -21,7 +21,7 @@ from cgraph.extend import Names
 from .. import theme
 from ..theme import Paint
 from .boxes_and_arrows import ClusterRule, Plan
-from .draw_shapes import digraph, draw_arrows, draw_boxes, draw_legend, literal
+from .draw_shapes import digraph, draw_boxes, draw_legend, escaped, literal
 
 if TYPE_CHECKING:
     from graphviz import Digraph
@@ -135,7 +135,8 @@ def to_dot(
     draw_boxes(drawing, boxes)
     if legend is not False:
         draw_legend(drawing, boxes, words, vertical=rankdir in ("BT", "TB"))
-    draw_arrows(drawing, plan.arrows())
+    for arrow in plan.arrows():
+        drawing.edge(arrow.tail, arrow.head, **escaped(arrow.attributes))
     return drawing
 
 

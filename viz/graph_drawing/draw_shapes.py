@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -75,20 +75,14 @@ def draw_boxes(drawing: Digraph, boxes: Sequence[Box]) -> None:
     for i, title in enumerate(sorted(clusters, key=theme.natural_order)):
         with drawing.subgraph(name=f"cluster_{i}") as frame:
             color = colors[title]
-            frame.attr(**_escaped({"id": f"t{i}", "label": title, "tooltip": title}), style="filled,rounded")
+            frame.attr(**escaped({"id": f"t{i}", "label": title, "tooltip": title}), style="filled,rounded")
             frame.attr(color=color, fillcolor=theme.tint(color, 0.08), labeljust="l", margin="10", fontsize="12")
             for box in clusters[title]:
                 _draw_box(frame, box)
 
 
 def _draw_box(drawing: Digraph, box: Box) -> None:
-    drawing.node(box.id, id=box.id, color=box.kind.line, fillcolor=box.kind.fill, **_escaped(box.attributes))
-
-
-def draw_arrows(drawing: Digraph, arrows: Iterable[Arrow]) -> None:
-    """Add the arrows."""
-    for arrow in arrows:
-        drawing.edge(arrow.tail, arrow.head, **_escaped(arrow.attributes))
+    drawing.node(box.id, id=box.id, color=box.kind.line, fillcolor=box.kind.fill, **escaped(box.attributes))
 
 
 def draw_legend(drawing: Digraph, boxes: Sequence[Box], words: Mapping[str, str], *, vertical: bool) -> None:
@@ -110,7 +104,8 @@ def draw_legend(drawing: Digraph, boxes: Sequence[Box], words: Mapping[str, str]
                 frame.edge(f"k{i}", f"k{i + 1}", style="invis")
 
 
-def _escaped(attributes: Attributes) -> Attributes:
+def escaped(attributes: Attributes) -> Attributes:
+    """Attributes whose texts are shown as they are."""
     return {key: literal(value) for key, value in attributes.items()}
 
 

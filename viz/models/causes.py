@@ -125,16 +125,12 @@ def _listed(rows: Sequence[tuple[str, float]], ends: Mapping[int, str], longest:
     width = max([len(name) for name, _ in rows], default=0)
     lines = []
     for i, (name, part) in enumerate(rows):
-        bar = "" if name == "sum" else _bar(part, longest)
+        size = BAR * abs(part) / longest if longest and name != "sum" else 0.0
+        bar = ("+" if part > 0.0 else "-") * (round(size) or int(size != 0.0))
         if i in ends and bar:
             bar = f"{bar:<{BAR}}"
         lines.append(f"  {name:<{width}}  {part:>+11.4g}  {'  '.join(filter(None, [bar, ends.get(i, '')]))}".rstrip())
     return lines
-
-
-def _bar(part: float, longest: float) -> str:
-    size = BAR * abs(part) / longest if longest else 0.0
-    return ("+" if part > 0.0 else "-") * (round(size) or int(part != 0.0))
 
 
 class CauseTable:

@@ -22,13 +22,7 @@ EXPLICIT, BRIEF = 130.0, 45.0  # symbols of an equation that is written out, of 
 LARGEST, FEW_INPUTS = 120, 16  # nodes of a graph that is written out, of so few inputs; of more inputs a third
 MATRICES = 4  # velocities up to which M is shown as a matrix
 MOST_PARTS = 8  # partial Lagrangians whose sum is shown
-LETTERS = {
-    "M": "MHA",
-    "c": "cbC",
-    "g": "gnG",
-    "d": "dD",
-    "Q": "QFu",
-}  # of which the first that is no parameter is taken
+LETTERS = {"M": "MHA", "c": "cbC", "g": "gnG", "d": "dD", "Q": "QFu"}  # the first that is no parameter is taken
 WORDS = {"M": "inertia", "c": "velocities", "g": "weight and springs", "d": "damping", "Q": "applied forces"}
 MASS = "M"
 PARTS = ("c", "g", "d", "Q")  # of the torque, beside M qdd
@@ -202,13 +196,9 @@ def _by_matrices(system: System) -> Block:
         *system.forces,
     ]
     entries = reading_form(nodes, ranks(forces.input_names))
-    matrix, *columns = (
-        [entries[i * n : (i + 1) * n] for i in range(n)],
-        *[entries[i * n : (i + 1) * n] for i in range(n, n + 4)],
-    )
-    kept = {
-        name: column for name, column in zip(PARTS, columns, strict=True) if any(each.value != 0.0 for each in column)
-    }
+    rows = [entries[i * n : (i + 1) * n] for i in range(n + len(PARTS))]
+    matrix, columns = rows[:n], zip(PARTS, rows[n:], strict=True)
+    kept = {name: column for name, column in columns if any(each.value != 0.0 for each in column)}
     letters = {name: variable(letter) for name, letter in _letters(system).items()}
     wide = max([sum([ink(entry) for entry in row]) for row in matrix]) > EXPLICIT / 2
     held: list[tuple[Side, ...]] = [(letters["M"], matrix)]
@@ -222,21 +212,20 @@ def _by_matrices(system: System) -> Block:
 def _spurious(scene: Scene, formulation: str) -> list[Block]:
     """What a formulation with Euler's step has too much, where it has."""
     verdict, system = formulation_verdict(scene, formulation), scene.system
+    quasi = system.kinematics.quasi is not None
     if not verdict.differs or verdict.terms is None or not verdict.excess:
         return []
-    names = [name for name, node in verdict.terms.outputs.items() if node.value != 0.0]
-    terms = Graph(verdict.terms.inputs, {name: verdict.terms.outputs[name] for name in names})
-    rights = [_right(each) for each in _statements(terms)]
+    terms = {name: node for name, node in verdict.terms.outputs.items() if node.value != 0.0}
+    rights = map(_right, _statements(Graph(verdict.terms.inputs, terms)))
     held: list[tuple[Side, ...]] = []
     energy, had = EMBEDDED[formulation]
-    for name, right in zip(names, rights, strict=True):
+    for name, right in zip(terms, rights, strict=True):
         if right.value == 0.0:
             continue
         i = name.removeprefix("tau")
         left = variable(f"tau_def{i}") - variable(name)
         slope = variable(f"∂{energy}") / variable(f"∂q{i}")
-        held.append((left, right) if system.kinematics.quasi is not None else (left, slope, right))
-    quasi = system.kinematics.quasi is not None
+        held.append((left, right) if quasi else (left, slope, right))
     if system.n > MATRICES or quasi:
         slope = variable(f"∂{energy}") / variable("∂q")
         held.insert(0, (variable("tau_def") - variable("tau"), variable("Gᵀ") * slope if quasi else slope))

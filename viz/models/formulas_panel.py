@@ -62,14 +62,11 @@ def formulas_panel(scene: Scene, *, momenta: bool = False) -> Panel:
     compare = () if momenta or scene.ode is not None else ("by_definition", "kinetic_only")
     equations = model_equations(scene, momenta=momenta, compare=compare)
     first = next((block for block in equations.blocks if block.wrong), None)
-    others = equations_html(replace(equations, blocks=[each for each in equations.blocks if each is not first]), LINES)
-    if first is None:
-        return _panel("", others)
-    alone = replace(equations, blocks=[first], indices={})
-    return _panel(_in_short(first, equations), f'<div class="first">{equations_html(alone, LINES)}</div>{others}')
-
-
-def _panel(head: str, inside: str) -> Panel:
+    others = replace(equations, blocks=[each for each in equations.blocks if each is not first])
+    head, inside = "", equations_html(others, LINES)
+    if first is not None:
+        head, alone = _in_short(first, equations), replace(equations, blocks=[first], indices={})
+        inside = f'<div class="first">{equations_html(alone, LINES)}</div>{inside}'
     body = f"<details><summary>Formulas{head}</summary>{inside}</details>"
     return Panel(end=f'<section id="formulas" aria-label="formulas" hidden>{body}</section>', style=STYLE, run=RUN)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,7 +23,6 @@ from dynamics.multibody.quantities.torque_causes import torque_by_cause
 from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import simulate
-from dynamics.simulation.trajectory import Trajectory
 from dynamics.systems.model import display_names
 from dynamics.systems.system import System
 
@@ -112,7 +111,9 @@ def inspection(
     for name in FORMULATIONS:
         say(f"{scene.name}: deriving inverse dynamics, {TITLES[name]}")
         versions[name] = _version(scene, name)
-    versions[FORWARD] = _forward(scene, rate)
+    about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
+    about += " With them come the forces that hold the constraints." if system.constraints else ""
+    versions[FORWARD] = Version(FORWARD, rate, about, steps=elimination(rate, display_names(scene)), group=FORWARD)
     say(f"{scene.name}: deriving Hamilton's equations, and the state equation beside them")
     lacking = ""
     try:
@@ -120,37 +121,22 @@ def inspection(
     except ValueError as error:  # a constraint, or a kinetic energy that gives no momenta
         lacking = f"No equations in momenta: {error}"
     derived = _derived(system, momenta=not lacking)
-    stopped = "" if run.stats.success else run.stats.message
-    shown = _along(scene, run, versions, state, derived, _shares(scene), stopped=stopped)
-    return replace(shown, carried=carried(scene), causes=_causes(scene), lacking=lacking)
-
-
-def _forward(scene: Scene, rate: Graph) -> Version:
-    about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
-    about += " With them come the forces that hold the constraints." if scene.system.constraints else ""
-    return Version(FORWARD, rate, about, steps=elimination(rate, display_names(scene)), group=FORWARD)
-
-
-def _along(
-    scene: Scene,
-    run: Trajectory,
-    versions: Mapping[str, Version],
-    state: Mapping[str, float | Array],
-    derived: Graph | None,
-    shares: StateTable | None = None,
-    *,
-    stopped: str,
-) -> Inspection:
-    """The versions along a motion.  state: values of all inputs that a graph may have.  stopped: why it ends early."""
     places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
-    graphs = [each.graph for each in versions.values()] + [each for each in (derived,) if each]
-    graphs += [places.graph] if places is not None else []
+    graphs = [derived, *[each.graph for each in versions.values()], *([places.graph] if places is not None else [])]
     inputs = {name for graph in graphs for name in graph.input_names}
-    at = {name: value for name, value in state.items() if name in inputs}
-    units = units | {"t": "s", "dt": "s"}
-    motion = Motion(run.t) if places is None else Motion(run.t, *places)
-    return Inspection(versions, motion, at, derived, shares, stopped=stopped, units=units)
+    return Inspection(
+        versions,
+        Motion(run.t) if places is None else Motion(run.t, *places),
+        at={name: value for name, value in state.items() if name in inputs},
+        derived=derived,
+        shares=_shares(scene),
+        carried=carried(scene),
+        stopped="" if run.stats.success else run.stats.message,
+        units=units | {"t": "s", "dt": "s"},
+        causes=_causes(scene),
+        lacking=lacking,
+    )
 
 
 def _hamilton(scene: Scene) -> list[Version]:
@@ -215,11 +201,8 @@ def _version(scene: Scene, name: str) -> Version:
     verdict = formulation_verdict(scene, name)
     about = f"{verdict.summary} {verdict.explanation}".strip()
     if not verdict.differs:
-        driven = (
-            "these torques are those of the constraints alone"
-            if scene.system.constraints
-            else "the torques should be 0"
-        )
+        held = bool(scene.system.constraints)
+        driven = "these torques are those of the constraints alone" if held else "the torques should be 0"
         about += f" Nothing drives the joints here: {driven}."
     return Version(
         TITLES[name],
@@ -323,15 +306,12 @@ def _pivot(solved: Node, others: set[Node], place: Mapping[Node, int]) -> Node |
     return min(found, key=lambda node: (bool(node.args), place[node]), default=None)
 
 
-BOTH = ("chain_rule", "newton_euler")
-
-
 def carried(scene: Scene) -> Table | None:
     """The nodes that only the chain rule has, counted by part of the model and by what they are; None where none is.
 
     The classes are those of `cgraph compare`: the rates of slopes are what -dL/dq cancels in part.
     """
-    verdicts = [formulation_verdict(scene, name) for name in BOTH]
+    verdicts = [formulation_verdict(scene, name) for name in ("chain_rule", "newton_euler")]
     left, right = (each.graph for each in verdicts)
     classes = cg.compare(left, right, classify=formulation_classes(verdicts)).classes("left")
     counts = {tuple(name.rpartition(": ")[::2]): count for name, count in classes.items()}

@@ -13,7 +13,7 @@ from ..pages.document import Block, Markup, Paragraph, Table
 from ..plots import plot
 from .part import Part, plotted
 
-SNAPSHOTS = 6
+SNAPSHOTS, WINDOWS = 6, 6  # pictures, and rows of the table
 SHOWN = 8  # steps from one point of the residual to the next
 FRAME = 20  # steps from one picture of the moving figure to the next
 PIXELS = 100  # of its picture, in a meter
@@ -55,7 +55,9 @@ def figures4_and_5() -> Part:
         f"Figure 5. The same arm in MuJoCo {version} (Section 4.1; the same method and step), as dots, over ours, as lines: joints "
         "at the same instants, and their paths."
     )
-    differences = _largest_differences(run, q)
+    apart = np.abs(run.q - q)
+    ends = np.linspace(0, len(apart) - 1, WINDOWS + 1).astype(int)[1:]
+    differences = [(float(run.t[k]), float(apart[: k + 1].max())) for k in ends]
     most = differences[-1][1]
     residual = (
         f"Figure 5, the residual: what our angles differ from MuJoCo's, joint by joint, at every {SHOWN}th step. The largest of all is {most:.1e} rad. "
@@ -63,8 +65,7 @@ def figures4_and_5() -> Part:
     )
     header = ("up to t [s]", "largest |difference in θ| [rad]")
     rows = [(f"{t:.2f}", f"{difference:.2e}") for t, difference in differences]
-    apart = np.abs(run.q - q)[::SHOWN]
-    shown = np.where(apart > 0.0, apart, np.nan)
+    shown = np.where(apart > 0.0, apart, np.nan)[::SHOWN]
     errors = plot.over_time(run.t[::SHOWN], shown, "|Δθ| [rad]", theme.LINKS)
     grows = f"Differences of three joint angles over time, from {differences[0][1]:.0e} rad up to {differences[0][0]:g} s to {most:.0e} rad."
     blocks += [
@@ -117,10 +118,3 @@ def _moving(scene: Scene, run: Trajectory, ours: Array, theirs: Array | None) ->
     )
     dt = float(run.t[FRAME] - run.t[0])
     return Markup(markup, caption), {"motion": {"dt": dt, "ours": frames[0], "theirs": frames[1]}}
-
-
-def _largest_differences(run: Trajectory, q: Array, windows: int = 6) -> list[tuple[float, float]]:
-    """(t, largest |difference in q| up to t [rad]) at the ends of equal stretches of time."""
-    difference = np.abs(run.q - q).max(axis=1)
-    ends = np.linspace(0, len(difference) - 1, windows + 1).astype(int)[1:]
-    return [(float(run.t[k]), float(difference[: k + 1].max())) for k in ends]

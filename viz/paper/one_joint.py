@@ -183,8 +183,8 @@ def figures_1_to_3() -> Part:
     sizes = formulation_sizes(scenes.load(SCENE))
     figures = {name: sizes[INERTIAL_TERM, formulation]._asdict() for name, (formulation, _, _) in WORDS.items()}
     moving, told = moving_figure()
-    graphs = [each.graph for each in moving.views.values()]
-    legend = legend_svg(kinds_in(*graphs, marked=moving.views["fig1"].wrong), 1, notes=NOTES)
+    kinds = [*kinds_in(*[each.graph for each in moving.views.values()]), theme.MARKED]
+    legend = legend_svg(kinds, 1, notes=NOTES)
     explained = Picture("legend", to_adaptive(legend), "Shapes, colors and arrows of Figures 1 to 3.", "auto")
     blocks: list[Block] = [
         Markup(stage_html(moving, told, explained), "Figures 1 to 3 on one layout are on the page alone."),

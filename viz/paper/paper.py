@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
@@ -24,9 +23,13 @@ from .scaling import scaling_of_counts
 from .timing import figure6
 from .typeset import typeset
 
-QUICK_EVALUATIONS = 100  # of each formulation, for Figure 6
-QUICK_ARMS = (1, 3)  # links, for the law of the embedding
-QUICK_LINKS = (1, 3, 6, 10, 20)  # of the chains of the scaling
+# Arguments for a quick run: evaluations of each formulation, mechanisms beside those drawn, links of arms and chains.
+QUICK: dict[Callable[..., Part], object] = {
+    figure6: 100,
+    figure7: {},
+    embedding: (1, 3),
+    scaling_of_counts: (1, 3, 6, 10, 20),
+}
 
 
 class Paper(NamedTuple):
@@ -51,23 +54,19 @@ def paper(
     check_can_draw()
     plot.check_can_plot()
     check_folder(folder)
-    makers: dict[str, Callable[[], Part]] = {
+    makers: dict[str, Callable[..., Part]] = {
         "Equation (3), read off the graphs term by term": equations,
         "Figures 1 to 3: by definition, kinetic only and by the chain rule, on one layout": figures_1_to_3,
         "Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo": figures4_and_5,
-        "Figure 6 and Table 1: the time of one evaluation": partial(figure6, QUICK_EVALUATIONS) if quick else figure6,
-        "Figure 7: both forms of the equations of motion, by depth": partial(figure7, {}) if quick else figure7,
-        "Figure 8: the law of the embedding, torque error against dt": (
-            partial(embedding, QUICK_ARMS) if quick else embedding
-        ),
-        "Figure 9: nodes, edges and time over the number of links": (
-            partial(scaling_of_counts, QUICK_LINKS) if quick else scaling_of_counts
-        ),
+        "Figure 6 and Table 1: the time of one evaluation": figure6,
+        "Figure 7: both forms of the equations of motion, by depth": figure7,
+        "Figure 8: the law of the embedding, torque error against dt": embedding,
+        "Figure 9: nodes, edges and time over the number of links": scaling_of_counts,
     }
     parts, files, total = [], dict[Path, str | bytes](), len(makers) + len(beside)
     for number, (what, make) in enumerate(makers.items(), start=1):
         say(f"[{number}/{total}] {what} ...")
-        part = make()
+        part = make(QUICK[make]) if quick and make in QUICK else make()
         made = part.files()
         files |= {folder / name: content for name, content in made.items()}
         say(f"[{number}/{total}] {', '.join(made)}: ready")
