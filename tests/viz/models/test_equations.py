@@ -112,7 +112,7 @@ def computed(found, known):
         for left, right in ready:
             if left not in ("n_tau", "n_tau_def - n_tau", "n_tau_def-n_tau"):  # the equation in general, of vectors
                 known[left.split(" = ")[0]] = eval(
-                    right.replace("^", "**"), {"__builtins__": {}, **FUNCTIONS, **MORE}, known
+                    right.replace("^", "**").replace("≤", "<="), {"__builtins__": {}, **FUNCTIONS, **MORE}, known
                 )
         rows = [row for row in rows if row not in ready]
     return known
