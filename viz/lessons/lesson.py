@@ -118,7 +118,7 @@ def lesson(
     screens = arranged([screen(on) for screen in chosen.screens], f"{subject} {on.scene.name} {' '.join(on.joints)}")
     heading = title or chosen.title
     if form == "page":
-        text = page(on, screens, heading, author, chosen.minutes, subject)
+        text = page(on, screens, heading, author, subject)
     else:
         text = worksheet(on, screens, heading, author, key=form == "key")
     if target is not None:
@@ -135,10 +135,8 @@ def arranged(screens: Sequence[Screen], seed: str) -> list[Screen]:
     return made
 
 
-def page(
-    subject: Subject, screens: Sequence[Screen], title: str, author: str = "", minutes: int = 0, chosen: str = "euler"
-) -> Page:
-    """The page of some screens, between the introduction and the end."""
+def page(subject: Subject, screens: Sequence[Screen], title: str, author: str, chosen: str) -> Page:
+    """The page of the screens of a lesson, of its name in `LESSONS`, between the introduction and the end."""
     data = {
         "answers": [screen.answer for screen in screens],
         "plays": [{key: each for key, each in (screen.play or {}).items() if key != "modules"} for screen in screens],
@@ -148,7 +146,7 @@ def page(
     by = f'<p class="by">{escape(author)}</p>' if author else ""
     start = (
         f'<section class="screen" id="start">\n<h2>Before you begin <small>{MINUTES} minutes</small></h2>\n'
-        f"<p>About {minutes} minutes, for those who know derivatives. On every screen predict first, then reveal. Keys: A to "
+        f"<p>About {LESSONS[chosen].minutes} minutes, for those who know derivatives. On every screen predict first, then reveal. Keys: A to "
         "F choose, the arrows turn the pages, Tab and Enter do all else. The address of the page holds your guesses: "
         "bookmark it to keep them. A term with dots below is explained where you press it, and in the glossary at the end. “The paper” is "
         "T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.</p>\n"
