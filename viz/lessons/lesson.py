@@ -142,6 +142,7 @@ def page(subject: Subject, screens: Sequence[Screen], title: str, author: str, c
         "plays": [{key: each for key, each in (screen.play or {}).items() if key != "modules"} for screen in screens],
         "values": subject.values,  # of inputs, where a play has no others
     }
+    modules = ", ".join([str((screen.play or {}).get("modules", "{}")) for screen in screens])
     body = "\n".join([screen.to_html(k) for k, screen in enumerate(screens, start=1)])
     by = f'<p class="by">{escape(author)}</p>' if author else ""
     start = (
@@ -157,7 +158,7 @@ def page(subject: Subject, screens: Sequence[Screen], title: str, author: str, c
         title,
         f'<header><h1>{escape(title)}</h1>{by}</header>\n<nav aria-label="Screens"></nav>\n<main>\n{text}\n{glossary(text)}\n</main>',
         asset(__package__, "lesson.css"),
-        f'"use strict";\n{modules(screens)}{scripts()}\n{asset(__package__, "app.js")}',
+        f'"use strict";\nconst MODULES = [{modules}];\n{scripts()}\n{asset(__package__, "app.js")}',
         {"data": data},
     )
 
@@ -165,12 +166,6 @@ def page(subject: Subject, screens: Sequence[Screen], title: str, author: str, c
 def scripts() -> str:
     """Scripts of the plays, and of what they need."""
     return "\n".join([asset(html.__package__, "elements.js", "tables.js"), asset(__package__, "plays.js")])
-
-
-def modules(screens: Sequence[Screen]) -> str:
-    """The constant MODULES of a script: of the play of each screen."""
-    texts = [str((screen.play or {}).get("modules", "{}")) for screen in screens]
-    return f"const MODULES = [{', '.join(texts)}];\n"
 
 
 def _end(subject: Subject, chosen: str) -> str:
@@ -184,17 +179,14 @@ def _end(subject: Subject, chosen: str) -> str:
             if key != chosen
         ]
     )
-    seen = f"<p>In short: {_sentence(subject)}</p>\n" if chosen == "euler" else ""
+    short = (
+        "a partial derivative holds every other input, but with the Euler relation in the graph q is no input any more: "
+        "it hangs on q̇, and ∂L/∂q comes into dp/dt at every dt."
+        if subject.verdict.differs
+        else "for this system the derivative by definition happens to be right."
+    )
+    seen = f"<p>In short: {short} {subject.verdict_text}</p>\n" if chosen == "euler" else ""
     return (
         f'<section class="screen" id="end">\n<h2>The end</h2>\n{seen}<p class="score"></p>\n'
         f"<h3>Next lessons</h3>\n<ul>{rows}</ul>\n</section>"
-    )
-
-
-def _sentence(subject: Subject) -> str:
-    if not subject.verdict.differs:
-        return f"for this system the derivative by definition happens to be right. {subject.verdict_text}"
-    return (
-        "a partial derivative holds every other input, but with the Euler relation in the graph q is no input any more: "
-        f"it hangs on q̇, and ∂L/∂q comes into dp/dt at every dt. {subject.verdict_text}"
     )

@@ -125,13 +125,9 @@ def _second_try(subject: Subject) -> str:
 def _sizes(subject: Subject) -> str:
     """The sizes of the graphs, for those who ask."""
     sizes = size_table(formulation_sizes(subject.system)).html()
-    why = (
-        f"<p>{in_letters(subject.verdict.lacking) or WHY_FEWER.replace('torque', subject.force)}</p>"
-        * subject.verdict.differs
-    )
-    pictures = _pictures(subject)
-    why = why.replace("spurious", term("spurious"), 1)
-    return f"<details><summary>How large the graphs are, and how much of them is there by mistake</summary>{sizes}{why}{pictures}</details>"
+    why = in_letters(subject.verdict.lacking) or WHY_FEWER.replace("torque", subject.force)
+    told = f"<p>{why.replace('spurious', term('spurious'), 1)}</p>" if subject.verdict.differs else ""
+    return f"<details><summary>How large the graphs are, and how much of them is there by mistake</summary>{sizes}{told}{_pictures(subject)}</details>"
 
 
 def _pictures(subject: Subject) -> str:
@@ -145,8 +141,7 @@ def _pictures(subject: Subject) -> str:
             legend = legend_svg(kinds_in(graph, marked=wrong))
             pictures = Picture("", to_adaptive(legend), "The colors of both pictures.", None).html()
         svg = subject.svg(plain_drawing(graph, subject.names, wrong, edges))
-        caption = (
-            f"The inertial term, {TITLES[formulation]}: {len(wrong)} of {len(graph.nodes)} nodes are there by mistake."
-        )
+        counts = f"{len(wrong)} of {len(graph.nodes)} nodes"
+        caption = f"The inertial term, {TITLES[formulation]}: {counts} are there by mistake."
         pictures += Picture("", to_adaptive(svg), caption, None).html()
     return pictures
