@@ -131,16 +131,8 @@ def page(
     if not isinstance(causes, StateTable | None):
         raise TypeError(f"causes must be a StateTable, got {type(causes).__name__}: {causes!r:.60}")
     live = [table for table in tables if isinstance(table, StateTable)]
-    data |= record(
-        versions,
-        motion,
-        names,
-        require_texts("units", units),
-        state=State(at or {}, derived),
-        columns=columns,
-        tables=live,
-        causes=causes,
-    )
+    units, state = require_texts("units", units), State(at or {}, derived)
+    data |= record(versions, motion, names, units, state=state, columns=columns, tables=live, causes=causes)
     return compose(title, data, [table for table in tables if isinstance(table, Table)], panels)
 
 

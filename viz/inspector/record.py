@@ -154,12 +154,7 @@ def _version(version: Version, letters: Letters) -> dict[str, Json]:
         "off": [name for name in version.graph.outputs if name in version.off],
         "excess": None if version.excess is None else _graph(version.excess, letters),
         "steps": [
-            {
-                "words": step.words,
-                "nodes": [number[node] for node in step.nodes],
-                "value": number[step.value],
-                "joint": step.joint,
-            }
+            step._asdict() | {"nodes": [number[node] for node in step.nodes], "value": number[step.value]}
             for step in version.steps
         ],
     }
@@ -173,36 +168,31 @@ def _drawings(graphs: Sequence[Graph], letters: Letters) -> list[dict[str, Json]
     """
     if max([len(graph.nodes) for graph in graphs], default=0) > SMALL_GRAPH:
         return [None] * len(graphs)
-    planned = [_planned(graph, letters) for graph in graphs]
+    planned = [_plan(graph, letters) for graph in graphs]
     try:
-        drawn = positions([(sizes, lines) for _, sizes, lines in planned])
+        drawn = positions([(list(sizes.values()), lines) for sizes, lines in planned])
     except RenderError:
         return [None] * len(graphs)
-    return [_drawing(graph, *plan, where) for graph, plan, where in zip(graphs, planned, drawn, strict=True)]
+    return [_drawing(graph, sizes, where) for graph, (sizes, _), where in zip(graphs, planned, drawn, strict=True)]
 
 
-_Plan = tuple[list[Node | str], list[tuple[float, float]], list[tuple[int, int]]]
+_Sizes = dict[Node | str, tuple[float, float]]  # of nodes but constants, then of outputs by name
 
 
-def _planned(graph: Graph, letters: Letters) -> _Plan:
-    """Parts of a drawing: nodes but constants, and outputs, their sizes, and the lines between them."""
-    shown: list[Node | str] = [node for node in graph.nodes if node.value is None]
-    at = {node: i for i, node in enumerate(shown)}
-    lines = [(at[edge.source], at[edge.target]) for edge in graph.edges if edge.source.value is None]
-    for name, node in graph.outputs.items():
-        if node in at:
-            lines.append((at[node], len(shown)))
-        shown.append(name)
-    sizes = [(_width(each, letters), LEAF_HEIGHT if isinstance(each, str) else NODE_HEIGHT) for each in shown]
-    return shown, sizes, list(dict.fromkeys(lines))
+def _plan(graph: Graph, letters: Letters) -> tuple[_Sizes, list[tuple[int, int]]]:
+    """Sizes of the parts of a drawing, and the lines between them."""
+    sizes: _Sizes = {node: (_width(node, letters), NODE_HEIGHT) for node in graph.nodes if node.value is None}
+    sizes |= {name: (_width(name, letters), LEAF_HEIGHT) for name in graph.outputs}
+    at = {each: i for i, each in enumerate(sizes)}
+    lines = [(at[edge.source], at[edge.target]) for edge in graph.edges if edge.source in at]
+    lines += [(at[node], at[name]) for name, node in graph.outputs.items() if node in at]
+    return sizes, list(dict.fromkeys(lines))
 
 
-def _drawing(
-    graph: Graph, shown: list[Node | str], sizes: list[tuple[float, float]], lines: object, where: Positions
-) -> dict[str, Json]:
-    boxes = {each: [x, y, w] for each, (x, y), (w, _) in zip(shown, where.centers, sizes, strict=True)}
+def _drawing(graph: Graph, sizes: _Sizes, where: Positions) -> dict[str, Json]:
+    boxes = {each: [x, y, sizes[each][0]] for each, (x, y) in zip(sizes, where.centers, strict=True)}
     number = {node: f"n{i}" for i, node in enumerate(graph.nodes)}
-    ids = [number[each] if isinstance(each, Node) else f"o{each}" for each in shown]
+    ids = [number[each] if isinstance(each, Node) else f"o{each}" for each in sizes]
     return {
         "width": where.size[0],
         "height": where.size[1],
@@ -219,13 +209,8 @@ def _width(shown: Node | str, letters: Letters) -> float:
     else:
         text = letters(shown.name) if shown.name else ""
         text += "".join([f" {arg.value:.3g}" for arg in shown.args if arg.value is not None])
-        text += (
-            f": {columns(shown.op).symbol}"
-            if shown.args and shown.name
-            else columns(shown.op).symbol
-            if shown.args
-            else ""
-        )
+        if shown.args:
+            text += f": {columns(shown.op).symbol}" if shown.name else columns(shown.op).symbol
     letters_wide = len(text.replace("\u0307", "").replace("\u0308", ""))
     return max(58.0, 7.4 * letters_wide + 14.0)
 

@@ -41,29 +41,29 @@ def introduction(subject: Subject) -> str:
     )
     rows = [[each, number(value)] for each, value in subject.system.parameters.items()]
     parameters = Table("Parameters, numbers that stay", ["name", "value"], rows[:SHOWN]).html() if rows else ""
-    return meant + _picture(subject) + _moment(subject) + parameters + asked
+    two_link = subject.names and subject.units and subject.scene.mechanism is None
+    picture = _arm(*map(float, subject.q)) if two_link else ""
+    return meant + picture + _moment(subject) + parameters + asked
 
 
 def _moment(subject: Subject) -> str:
     """Coordinates, velocities and accelerations; of a ball or a free joint these have rows of their own."""
-    rows = []
-    for kind, many in (("q", subject.system.nq), ("qd", subject.system.n), ("qdd", subject.system.n)):
-        for i in range(min(many, SHOWN)):
-            value = f"{number(subject.values[f'{kind}{i}'])}{subject.unit(f'{kind}{i}')}"
-            rows.append([subject.shown(f"{kind}{i}"), value])
-    if subject.system.nq == subject.system.n:
-        shown = min(subject.system.n, SHOWN)
-        lines = [[row for each in range(3) for row in rows[each * shown + i]] for i in range(shown)]
+    system = subject.system
+    kinds = (("q", system.nq), ("qd", system.n), ("qdd", system.n))
+    names = [f"{kind}{i}" for kind, many in kinds for i in range(min(many, SHOWN))]
+    rows = [[subject.shown(name), f"{number(subject.values[name])}{subject.unit(name)}"] for name in names]
+    header = ["quantity", "value"]
+    if system.nq == system.n:
+        shown = min(system.n, SHOWN)
+        rows = [[cell for row in rows[i::shown] for cell in row] for i in range(shown)]
         header = ["coordinate", "value", "velocity", "value", "acceleration", "value"]
-        table = Table("This moment", header, lines).html()
-    else:
-        table = Table("This moment", ["quantity", "value"], rows).html()
+    table = Table("This moment", header, rows).html()
     told = bool(subject.units or subject.scene.about)
     units = (
         "" if told else "<p>The numbers have no units here: any that fit one another will do, such as those of SI.</p>"
     )
     units += f"<p>{_chosen(subject)}</p>"
-    more = subject.system.n - SHOWN
+    more = system.n - SHOWN
     return table + units + (f"<p>{more} more {'is' if more == 1 else 'are'} not shown.</p>" if more > 0 else "")
 
 
@@ -75,13 +75,6 @@ def _chosen(subject: Subject) -> str:
     is_kept = f" {kept} {'are those' if ' and ' in kept else 'is that'} of the model’s start." if kept else ""
     chosen = chosen.replace(" and ", ", ", max(0, chosen.count(" and ") - 1))
     return f"The lesson has chosen {chosen}, so that every {subject.joint} moves.{is_kept}"
-
-
-def _picture(subject: Subject) -> str:
-    """The two-link arm at this moment, with its angles; of other systems nothing."""
-    if len(subject.names) and subject.units and subject.scene.mechanism is None:
-        return _arm(*(float(x) for x in subject.q))
-    return ""
 
 
 def _arm(shoulder: float, elbow: float) -> str:

@@ -118,7 +118,7 @@ def lesson(
     screens = arranged([screen(on) for screen in chosen.screens], f"{subject} {on.scene.name} {' '.join(on.joints)}")
     heading = title or chosen.title
     if form == "page":
-        text = page(on, screens, heading, author, chosen.minutes, subject)
+        text = page(on, screens, heading, author, subject)
     else:
         text = worksheet(on, screens, heading, author, key=form == "key")
     if target is not None:
@@ -135,20 +135,19 @@ def arranged(screens: Sequence[Screen], seed: str) -> list[Screen]:
     return made
 
 
-def page(
-    subject: Subject, screens: Sequence[Screen], title: str, author: str = "", minutes: int = 0, chosen: str = "euler"
-) -> Page:
-    """The page of some screens, between the introduction and the end."""
+def page(subject: Subject, screens: Sequence[Screen], title: str, author: str, chosen: str) -> Page:
+    """The page of the screens of a lesson, of its name in `LESSONS`, between the introduction and the end."""
     data = {
         "answers": [screen.answer for screen in screens],
         "plays": [{key: each for key, each in (screen.play or {}).items() if key != "modules"} for screen in screens],
         "values": subject.values,  # of inputs, where a play has no others
     }
+    modules = ", ".join([str((screen.play or {}).get("modules", "{}")) for screen in screens])
     body = "\n".join([screen.to_html(k) for k, screen in enumerate(screens, start=1)])
     by = f'<p class="by">{escape(author)}</p>' if author else ""
     start = (
         f'<section class="screen" id="start">\n<h2>Before you begin <small>{MINUTES} minutes</small></h2>\n'
-        f"<p>About {minutes} minutes, for those who know derivatives. On every screen predict first, then reveal. Keys: A to "
+        f"<p>About {LESSONS[chosen].minutes} minutes, for those who know derivatives. On every screen predict first, then reveal. Keys: A to "
         "F choose, the arrows turn the pages, Tab and Enter do all else. The address of the page holds your guesses: "
         "bookmark it to keep them. A term with dots below is explained where you press it, and in the glossary at the end. “The paper” is "
         "T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.</p>\n"
@@ -159,7 +158,7 @@ def page(
         title,
         f'<header><h1>{escape(title)}</h1>{by}</header>\n<nav aria-label="Screens"></nav>\n<main>\n{text}\n{glossary(text)}\n</main>',
         asset(__package__, "lesson.css"),
-        f'"use strict";\n{modules(screens)}{scripts()}\n{asset(__package__, "app.js")}',
+        f'"use strict";\nconst MODULES = [{modules}];\n{scripts()}\n{asset(__package__, "app.js")}',
         {"data": data},
     )
 
@@ -167,12 +166,6 @@ def page(
 def scripts() -> str:
     """Scripts of the plays, and of what they need."""
     return "\n".join([asset(html.__package__, "elements.js", "tables.js"), asset(__package__, "plays.js")])
-
-
-def modules(screens: Sequence[Screen]) -> str:
-    """The constant MODULES of a script: of the play of each screen."""
-    texts = [str((screen.play or {}).get("modules", "{}")) for screen in screens]
-    return f"const MODULES = [{', '.join(texts)}];\n"
 
 
 def _end(subject: Subject, chosen: str) -> str:
@@ -186,17 +179,14 @@ def _end(subject: Subject, chosen: str) -> str:
             if key != chosen
         ]
     )
-    seen = f"<p>In short: {_sentence(subject)}</p>\n" if chosen == "euler" else ""
+    short = (
+        "a partial derivative holds every other input, but with the Euler relation in the graph q is no input any more: "
+        "it hangs on q̇, and ∂L/∂q comes into dp/dt at every dt."
+        if subject.verdict.differs
+        else "for this system the derivative by definition happens to be right."
+    )
+    seen = f"<p>In short: {short} {subject.verdict_text}</p>\n" if chosen == "euler" else ""
     return (
         f'<section class="screen" id="end">\n<h2>The end</h2>\n{seen}<p class="score"></p>\n'
         f"<h3>Next lessons</h3>\n<ul>{rows}</ul>\n</section>"
-    )
-
-
-def _sentence(subject: Subject) -> str:
-    if not subject.verdict.differs:
-        return f"for this system the derivative by definition happens to be right. {subject.verdict_text}"
-    return (
-        "a partial derivative holds every other input, but with the Euler relation in the graph q is no input any more: "
-        f"it hangs on q̇, and ∂L/∂q comes into dp/dt at every dt. {subject.verdict_text}"
     )

@@ -77,11 +77,9 @@ class Screen:
         )
         shown, marked = (self.figure.html(), self.figure.html(marked=True)) if self.figure else ("", "")
         words = self.play_words if self.play else TOO_LARGE
-        board = (
-            f'<div class="walk">{self.picture}<div class="board"></div></div>'
-            if self.picture
-            else '<div class="board"></div>'
-        )
+        board = '<div class="board"></div>'
+        if self.picture:
+            board = f'<div class="walk">{self.picture}{board}</div>'
         play = f'<div class="play"><h3>Try it</h3><p>{words}</p>{board}</div>\n'
         return (
             f'<section class="screen" id="{escape(self.anchor)}">\n{self._heading(number)}\n{self.story}\n{shown}\n'

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -210,9 +209,3 @@ def in_letters(text: str) -> str:
 def number(value: float) -> str:
     """Four digits, with a minus that is one."""
     return f"{value:.4g}".replace("-", "−") if value else "0"
-
-
-def inline(svg: str, name: str, about: str) -> str:
-    """A drawing of a graph whose nodes the page's script can light up; its ids begin with the name."""
-    svg = re.sub(r'\bid="', f'id="{name}-', svg)
-    return f'<div class="graph-picture" role="img" aria-label="{escape(about)}">{svg}</div>'

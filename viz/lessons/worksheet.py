@@ -22,11 +22,11 @@ def worksheet(subject: Subject, screens: Sequence[Screen], title: str, author: s
     by = f'<p class="by">{escape(author)}</p>' if author else ""
     lines = "".join([f"<span>{label}</span>" for label in ("Name", "Class", "Date")])
     body = "\n".join([screen.paper_html(k, key=key) for k, screen in enumerate(screens, start=1)])
-    text = (
-        f"{body}\n{_latex(subject)}"
-        if key
-        else f'<p class="fill">{lines}</p>\n<section id="start"><h2>Before you begin</h2>\n{introduction(subject)}</section>\n{body}'
-    )
+    if key:
+        latex = escape(equations_latex(model_equations(subject.scene), LINES))
+        text = f'{body}\n<section id="latex"><h2>Equations as LaTeX</h2>\n<pre>{latex}</pre></section>'
+    else:
+        text = f'<p class="fill">{lines}</p>\n<section id="start"><h2>Before you begin</h2>\n{introduction(subject)}</section>\n{body}'
     text = re.sub(r'<math display="block">(?=(.*?)</math>)', _fitted, text, flags=re.DOTALL)
     heading = f"Key: {title}" if key else title
     return html.compose(
@@ -40,9 +40,3 @@ def _fitted(found: re.Match[str]) -> str:
     """A formula as small as its widest row needs: paper has no scroll bar."""
     letters = max([len(unescape(re.sub("<[^>]*>", "", row))) for row in found[1].split("</mtr>")])
     return found[0] if letters <= WIDEST else f'{found[0][:-1]} style="font-size: {WIDEST / letters:.2f}em">'
-
-
-def _latex(subject: Subject) -> str:
-    """The Lagrangian, the momenta and tau, to be copied: what `cgraph equations --latex` prints."""
-    text = equations_latex(model_equations(subject.scene), LINES)
-    return f'<section id="latex"><h2>Equations as LaTeX</h2>\n<pre>{escape(text)}</pre></section>'

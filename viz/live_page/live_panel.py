@@ -18,12 +18,7 @@ from ..pages.html import Page, Panel, asset
 from ..pages.operations import expression
 
 TIME = "t"  # the input that is the time, if there is one
-GROUPS = (
-    ("q", "positions"),
-    ("qd", "velocities"),
-    ("p", "momenta"),
-    ("tau", "torques"),
-)  # of inputs, by the start of their names
+GROUPS = {"q": "positions", "qd": "velocities", "p": "momenta", "tau": "torques"}  # of inputs: their letters
 ENERGY, ENERGIES = "energy", 3  # the group of the meters that the strip shows, and how many these are
 
 
@@ -65,7 +60,7 @@ class Live:
             "shownCount": len(self.shown.outputs),
             "states": len(self.rate.outputs),
             "time": self.rate.input_names.index(TIME) if TIME in self.rate.input_names else -1,
-            "inputs": [self._input(name, self.names.get(name, name)) for name in self.rate.input_names],
+            "inputs": [self._input(name) for name in self.rate.input_names],
             "meters": [{"called": name, "unit": unit, "group": group} for name, unit, group in self.meters],
             "energy": ENERGIES - 1 if any(group == ENERGY for _, _, group in self.meters) else -1,
             "notes": dict(self.notes),
@@ -75,20 +70,19 @@ class Live:
             "dt": float(self.dt),
         }
 
-    def _input(self, name: str, called: str) -> dict[str, Json]:
+    def _input(self, name: str) -> dict[str, Json]:
         value = float(self.start[name])
         scale = float(self.scales.get(name, 3.0 * abs(value) or 1.0))
-        kinds = [group for start, group in GROUPS if name.startswith(start) and name.removeprefix(start).isdecimal()]
-        group = (
-            kinds[0] if kinds else "state" if name in self.rate.input_names[: len(self.rate.outputs)] else "parameters"
-        )
+        kind = GROUPS.get(name.rstrip("0123456789")) if name[-1:].isdecimal() else None
+        other = "state" if name in self.rate.input_names[: len(self.rate.outputs)] else "parameters"
+        group = kind or other
         low = 0.0 if group == "parameters" and value > 0.0 else -scale  # a mass, a length, gravity
         lower, upper = self.limits.get(name, (-math.inf, math.inf))
         low = min(lower, value) if math.isfinite(lower) else min(low, upper - scale)
         high = max(upper, value) if math.isfinite(upper) else max(scale, low + scale)
         if not low < high:
             low, high = value - scale, value + scale
-        unit = self.units.get(name, "")
+        called, unit = self.names.get(name, name), self.units.get(name, "")
         return {"name": name, "called": called, "unit": unit, "value": value, "low": low, "high": high, "group": group}
 
 

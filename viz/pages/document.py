@@ -53,21 +53,6 @@ class Markup:
 
 
 @dataclass(frozen=True)
-class Listing:
-    """Text in lines as they are."""
-
-    text: str
-
-    def html(self) -> str:
-        """The lines as HTML."""
-        return f'<pre tabindex="0">{escape(self.text)}</pre>'
-
-    def markdown(self, folder: str) -> list[str]:
-        """Lines of Markdown."""
-        return ["```", self.text.rstrip("\n"), "```", ""]
-
-
-@dataclass(frozen=True)
 class Table:
     """Texts in rows; the first column is read to the left, the others to the right.
 
@@ -97,7 +82,9 @@ class Table:
     def markdown(self, folder: str) -> list[str]:
         """Lines of Markdown."""
         rule = "|" + "|".join([":--", *["--:"] * (len(self.header) - 1)]) + "|"
-        return [f"**{self.caption}**", "", _row(self.header), rule, *map(_row, self.rows), ""]
+        lines = [" | ".join([cell.replace("|", "\\|") for cell in cells]) for cells in (self.header, *self.rows)]
+        head, *rows = [f"| {line} |" for line in lines]
+        return [f"**{self.caption}**", "", head, rule, *rows, ""]
 
 
 @dataclass(frozen=True)
@@ -132,12 +119,7 @@ class Picture:
         return [f"![{self.caption}]({folder}{self.name}.svg)", ""]
 
 
-def _row(cells: Sequence[str]) -> str:
-    """A row of a table in Markdown."""
-    return "| " + " | ".join([cell.replace("|", "\\|") for cell in cells]) + " |"
-
-
-Block = Paragraph | Markup | Listing | Table | Picture
+Block = Paragraph | Markup | Table | Picture
 
 
 @dataclass(frozen=True)
@@ -191,14 +173,12 @@ def _html(blocks: Sequence[Block]) -> str:
 
 def to_markdown(document: Document, folder: str = "") -> str:
     """The document as Markdown.  folder: where its pictures are, `<name>.svg` each, relative to the text."""
-    lines = [f"# {document.title}", "", *_markdown(document.introduction, folder)]
-    for section in document.sections:
-        lines += [f"## {section.heading}", "", *_markdown(section.blocks, folder)]
+    parts = [(f"# {document.title}", document.introduction)]
+    parts += [(f"## {section.heading}", section.blocks) for section in document.sections]
+    lines: list[str] = []
+    for heading, blocks in parts:
+        lines += [heading, "", *[line for block in blocks for line in block.markdown(folder)]]
     return "\n".join(lines).rstrip() + "\n"
-
-
-def _markdown(blocks: Sequence[Block], folder: str) -> list[str]:
-    return [line for block in blocks for line in block.markdown(folder)]
 
 
 def check_folder(folder: Path) -> None:

@@ -27,15 +27,9 @@ def size_table(sizes: Mapping[tuple[str, str], Sequence[int]]) -> Table:
 
     Sizes are those of `dynamics.formulation_sizes`.
     """
-    rows = [
-        [f"{theme.pretty(term)}, {TITLES[formulation]}", *[str(count) for count in counts], _mistakes(*wrong)]
-        for (term, formulation), (*counts, nodes, edges, missing) in sizes.items()
-        for wrong in [(nodes, edges, missing)]
-    ]
+    rows, kinds = [], ("node", "edge", "missing term")
+    for (term, formulation), found in sizes.items():
+        mistakes = [counted(count, kind) for count, kind in zip(found[3:], kinds, strict=True) if count]
+        counts = [str(count) for count in found[:3]]
+        rows.append([f"{theme.pretty(term)}, {TITLES[formulation]}", *counts, ", ".join(mistakes) or "none"])
     return Table("Sizes of the graphs", ["", "nodes", "edges", "depth", "there by mistake"], rows)
-
-
-def _mistakes(nodes: int, edges: int, missing: int) -> str:
-    """Words on nodes and edges that are there by mistake, and terms that are missing."""
-    kinds = ((nodes, "node"), (edges, "edge"), (missing, "missing term"))
-    return ", ".join([counted(count, kind) for count, kind in kinds if count]) or "none"

@@ -39,9 +39,8 @@ def graph_html(graph: Graph) -> str:
     """
     require_graph("graph_html", graph)
     tags = tags_to_collapse(graph)
-    said = (
-        f"{counted(len(graph.nodes), 'node')}; <code>viz.page(graph)</code> unfolds them, and shows values and paths."
-    )
+    nodes = counted(len(graph.nodes), "node")
+    said = f"{nodes}; <code>viz.page(graph)</code> unfolds them, and shows values and paths."
     if len(graph.nodes) > LARGE_GRAPH and not tags:
         return f"<p>{escape(repr(graph))}: {said}</p>"
     known = remarks_of(graph)
@@ -75,9 +74,8 @@ def trajectory_html(run: Rows) -> str:
         tables.append(("velocities", run.qd, run.velocities))
     with style():
         figure = empty_figure(2 * HALF if len(tables) == 2 else 1.5 * HALF, 2.8)
-        for axis, (what, values, names) in zip(
-            np.atleast_1d(figure.subplots(1, len(tables))).flat, tables, strict=True
-        ):
+        axes = np.atleast_1d(figure.subplots(1, len(tables))).flat
+        for axis, (what, values, names) in zip(axes, tables, strict=True):
             for i in range(min(COLUMNS, values.shape[1])):
                 color, dashes = theme.SERIES[i % len(theme.SERIES)], ("-", "--", ":")[i // len(theme.SERIES) % 3]
                 axis.plot(run.t, values[:, i], color=color, linestyle=dashes, label=names[i] if names else str(i))

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FROM, TO = 1e-12, 1e13  # shares of a bound that are drawn; what is outside is drawn at the border
+SHARES = "Figures over their bounds: to the right of the line, a bound is not met."
 WIDTH, LINE, FRAME = 10.0, 0.17, 1.0  # inches: of a picture, of each case, and for the axis
 
 
@@ -34,15 +35,14 @@ def _introduction(content: ReportData) -> list[Block]:
     verdict += f"; limits with a known reason: {counts['limit']}; unexplained: {counts['unexplained']}"
     quick = " A quick run: some of the cases, shorter runs, shorter arms." if content["quick"] else ""
     load = "" if content["load"] is None else f" The load of the machine was {content['load']:.1f} at the end."
+    machine = " ".join(str(content["machine"]).split())
     return [
         Paragraph(f"{verdict}.", point=True, warning=counts["unexplained"] > 0),
         Paragraph(
             "Every row is a case that is hard for arithmetic or for an integrator: what was measured, the bound that "
             f"was set beforehand, and whether the one is within the other.{quick}"
         ),
-        Paragraph(
-            f"{content['date']}, {content['seconds']:.0f} s in all. {' '.join(str(content['machine']).split())}.{load}"
-        ),
+        Paragraph(f"{content['date']}, {content['seconds']:.0f} s in all. {machine}.{load}"),
     ]
 
 
@@ -68,7 +68,6 @@ _HEADER = ["case", "method", "verdict", "figure", "value", "bound", "steps", "ti
 def _section(section: ReportData) -> Section:
     name, rows = section["name"], section["rows"]
     anchor = re.sub(r"[^a-z]+", "-", name.lower())
-    svg = to_adaptive_svg(shares(rows))
     shown = len(_HEADER) if any(row["steps"] or row["rejected"] for row in rows) else 6
     lines = [line[:shown] for row in rows for line in _lines(row)]
     hard = dict.fromkeys([f"{row['case']}: {row['about']}" for row in rows])
@@ -79,7 +78,7 @@ def _section(section: ReportData) -> Section:
         name,
         [
             Paragraph(section["about"]),
-            Picture(anchor, svg, "Figures over their bounds: to the right of the line, a bound is not met."),
+            Picture(anchor, to_adaptive_svg(shares(rows)), SHARES),
             Table("Verdicts", _HEADER[:shown], lines),
             Table("What is hard", ["case"], [[case] for case in hard], folded=True),
             Table("Why these bounds", ["figure"], [[bound] for bound in bounds], folded=True),
@@ -94,21 +93,12 @@ def _lines(row: ReportData, missed: bool = False) -> list[list[str]]:
         if not (missed and figure["meets"]):
             bound = "" if figure["bound"] == "inf" else _number(figure["bound"])
             value = _number(figure["value"]) + ("" if figure["meets"] else " ✗")
-            measured.append([figure["quantity"] + _unit(figure), value, bound])
+            unit = "" if str(figure["unit"]).startswith("of ") else f" [{figure['unit']}]"  # a share has none
+            measured.append([figure["quantity"] + unit, value, bound])
     first, *others = measured or [["", "", ""]]
-    return [[row["case"], row["method"], row["verdict"], *first, *_run(row)]] + [
-        ["", "", "", *cells, "", ""] for cells in others
-    ]
-
-
-def _unit(figure: ReportData) -> str:
-    """The unit, in brackets; none for a share of what the section names."""
-    return "" if str(figure["unit"]).startswith("of ") else f" [{figure['unit']}]"
-
-
-def _run(row: ReportData) -> list[str]:
-    rejected = f" + {row['rejected']}" if row["rejected"] else ""
-    return [f"{row['steps']}{rejected}", f"{row['seconds']:.2f}"]
+    steps = f"{row['steps']} + {row['rejected']}" if row["rejected"] else f"{row['steps']}"
+    shared = [row["case"], row["method"], row["verdict"], *first, steps, f"{row['seconds']:.2f}"]
+    return [shared, *[["", "", "", *cells, "", ""] for cells in others]]
 
 
 def _number(value: float | str) -> str:
@@ -121,12 +111,8 @@ def _number(value: float | str) -> str:
 def shares(rows: Sequence[ReportData]) -> Figure:
     """Every figure over its bound, a line for each case, on one logarithmic axis; those beyond 1 in another color."""
     names = list(dict.fromkeys(row["case"] for row in rows))
-    points = [
-        (_share(each), names.index(row["case"]), each["meets"])
-        for row in rows
-        for each in row["measurements"]
-        if each["bound"] != "inf"
-    ]
+    measured = [(row["case"], each) for row in rows for each in row["measurements"] if each["bound"] != "inf"]
+    points = [(_share(each), names.index(case), each["meets"]) for case, each in measured]
     with style():
         figure = empty_figure(WIDTH, FRAME + LINE * len(names))
         axis = figure.subplots()

@@ -8,14 +8,21 @@ from ..plots.plot import to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, ReportData, Section, Table, left_out
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
+RIGHT = "(smaller to the right)"
 DRAWN = 3.0  # errors above are no motion of this kind any more
 
 
 def work_precision(content: ReportData) -> Document:
     """The document of one report."""
-    sections = [_fastest(content), _against_time(content), _orders(content)]
+    time = "Run time against error at the end: lower and further right is better. The same scales in all panels."
+    drift = "Run time against the largest change of energy over the instants, relative to the largest kinetic energy."
+    sections = [
+        _fastest(content),
+        _times(content, "time", "Run time against error", "error", "error at the end", time),
+        _orders(content),
+    ]
     if content["conservative"]:
-        sections.append(_energy(content))
+        sections.append(_times(content, "energy", "Energy", "drift", "change of energy", drift))
     sections += [_points(content), _absent(content)]
     return Document(f"Error and run time: {content['name']}", _introduction(content), sections)
 
@@ -23,6 +30,12 @@ def work_precision(content: ReportData) -> Document:
 def _introduction(content: ReportData) -> list[Block]:
     times = content["times"]
     size = "natural size" if content["relative_to"] == "given" else "largest value"
+    before, after = content["load"]
+    busy = ""
+    if before is not None and after is not None:
+        busy = (
+            f"The load of the machine was {before:.1f} before and {after:.1f} after: above its cores, times are noisy."
+        )
     stiff = "; stiff" if content["stiff"] else ""
     return [
         *left_out(content["left_out"]),
@@ -37,16 +50,9 @@ def _introduction(content: ReportData) -> list[Block]:
         ),
         Paragraph(
             "Times are the shortest of runs that take turns, warm, from the start to the end of the motion: nothing is "
-            f"derived or compiled in them. {_sentence(content['machine'])} {_busy(content)}"
+            f"derived or compiled in them. {_sentence(content['machine'])} {busy}"
         ),
     ]
-
-
-def _busy(content: ReportData) -> str:
-    before, after = content["load"]
-    if before is None or after is None:
-        return ""
-    return f"The load of the machine was {before:.1f} before and {after:.1f} after: above its cores, times are noisy."
 
 
 def _fastest(content: ReportData) -> Section:
@@ -58,10 +64,13 @@ def _fastest(content: ReportData) -> Section:
     return Section("fastest", "Fastest for an error", [table, note])
 
 
-def _against_time(content: ReportData) -> Section:
-    caption = "Run time against error at the end: lower and further right is better. The same scales in all panels."
-    picture = _picture("time", _panels(content, "error", "error at the end"), caption)
-    return Section("time", "Run time against error", [picture])
+def _times(content: ReportData, anchor: str, heading: str, x: str, axis: str, caption: str) -> Section:
+    """Run times against the column x, of equal and of chosen steps."""
+    panels = [
+        PlotPanel(kind, f"{axis} {RIGHT}", "run time [s]", [_line(curve, x, "seconds") for curve in curves])
+        for kind, curves in _of_kind(content).items()
+    ]
+    return Section(anchor, heading, [_picture(anchor, panels, caption)])
 
 
 def _picture(name: str, panels: Sequence[PlotPanel], caption: str, shared: bool = True) -> Block:
@@ -75,18 +84,6 @@ def _picture(name: str, panels: Sequence[PlotPanel], caption: str, shared: bool 
 def _of_kind(content: ReportData) -> dict[str, list[ReportData]]:
     """{equal or chosen steps: curves}."""
     return {kind: [curve for curve in content["curves"] if curve["kind"] == kind] for kind in (EQUAL, CHOSEN)}
-
-
-def _panel(kind: str, x: str, y: str, lines: list[Line]) -> PlotPanel:
-    return PlotPanel(kind, f"{x} (smaller to the right)", y, lines)
-
-
-def _panels(content: ReportData, x: str, name: str) -> list[PlotPanel]:
-    """Run times against x, which has that name, of equal and of chosen steps."""
-    return [
-        _panel(kind, name, "run time [s]", [_line(curve, x, "seconds") for curve in curves])
-        for kind, curves in _of_kind(content).items()
-    ]
 
 
 def _line(curve: ReportData, x: str, y: str) -> Line:
@@ -110,12 +107,12 @@ def _orders(content: ReportData) -> Section:
     for kind, curves in _of_kind(content).items():
         equal = kind == EQUAL
         columns = ("step", "largest") if equal else ("knob", "error")
-        axes = ("step [s]", "largest error") if equal else ("relative tolerance", "error at the end")
+        x, y = ("step [s]", "largest error") if equal else ("relative tolerance", "error at the end")
         lines = [_line(curve, *columns) for curve in curves]
         knobs = sorted({point["knob"] for curve in curves for point in curve["points"]}, reverse=True)
         if not equal and len(knobs) > 1:
             lines.append(Line("error = tolerance", knobs, knobs, None))
-        panels.append(_panel(kind, *axes, lines))
+        panels.append(PlotPanel(kind, f"{x} {RIGHT}", y, lines))
     rows = [
         [
             curve["name"],
@@ -142,48 +139,27 @@ def _orders(content: ReportData) -> Section:
     )
 
 
-def _energy(content: ReportData) -> Section:
-    panels = _panels(content, "drift", "change of energy")
-    caption = "Run time against the largest change of energy over the instants, relative to the largest kinetic energy."
-    return Section("energy", "Energy", [_picture("energy", panels, caption)])
-
-
 def _points(content: ReportData) -> Section:
     blocks: list[Block] = [Paragraph("The same figures are in the CSV and JSON files.")]
     header = ["steps or tolerance", "steps", "rejected", "evaluations", "shortest", "median", "error at the end"]
-    header += ["largest error", *(["change of energy"] if content["conservative"] else [])]
+    header += ["largest error", *["change of energy"] * content["conservative"]]
+    errors = ("error", "largest", *["drift"] * content["conservative"])
     for curve in content["curves"]:
         rows = []
         for point in curve["points"]:
             knob = str(int(point["knob"])) if curve["kind"] == EQUAL else _power(point["knob"])
             counts = ["-" if point[what] is None else str(point[what]) for what in ("steps", "rejected", "evaluations")]
-            row = [
-                knob,
-                *counts,
-                _time(point["seconds"]),
-                _time(point["median"]),
-                _power(point["error"]),
-                _power(point["largest"]),
-            ]
-            rows.append([*row, *([_power(point["drift"])] if content["conservative"] else [])])
+            times = [_time(point["seconds"]), _time(point["median"])]
+            rows.append([knob, *counts, *times, *[_power(point[what]) for what in errors]])
         blocks.append(Table(curve["name"], header, rows, folded=True))
     return Section("points", "All points", blocks)
 
 
 def _absent(content: ReportData) -> Section:
-    return Section(
-        "absent",
-        "What is not there",
-        [
-            Table(
-                "Methods without a point",
-                ["method", "why"],
-                [[name, why] for name, why in content["absent"].items()],
-            )
-        ]
-        if content["absent"]
-        else [Paragraph("Every method that was asked has points.")],
-    )
+    rows = [[name, why] for name, why in content["absent"].items()]
+    table = Table("Methods without a point", ["method", "why"], rows)
+    block: Block = table if rows else Paragraph("Every method that was asked has points.")
+    return Section("absent", "What is not there", [block])
 
 
 def _sentence(text: str) -> str:

@@ -4,6 +4,7 @@ from html import escape
 
 import numpy as np
 
+from cgraph import Graph
 from cgraph._shared import Array
 from dynamics import formulation_sizes, formulation_verdict, inverse_dynamics
 from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
@@ -26,7 +27,8 @@ ROUNDING = 1e-9  # of the largest torque of the moment: 0
 
 def check(subject: Subject) -> Screen:
     """The screen of a system."""
-    right, wrong = inverse_dynamics(subject.system, "chain_rule"), subject.verdict.graph
+    right, wrong, terms = inverse_dynamics(subject.system, "chain_rule"), subject.verdict.graph, subject.verdict.terms
+    assert terms is not None
     still = {f"{kind}{i}": 0.0 for kind in ("qd", "qdd") for i in range(subject.system.n)}
     held, found = subject.evaluate(right, **still), outputs_after_step(subject, wrong, DT, **still)
     k = int(np.abs(held).argmax())
@@ -44,7 +46,7 @@ def check(subject: Subject) -> Screen:
         5,
         "<p>How does one notice? Nothing crashes, and every number is a derivative that was taken without any mistake in "
         f"the calculus. One compares with a case that is known. Here: the system <b>at rest</b>, q̇ = q̈ = 0, in the "
-        f"coordinates of this moment. {_at_rest(subject, held, still)} the {subject.force} that holds the system where it "
+        f"coordinates of this moment. {_at_rest(subject, terms, held, still)} the {subject.force} that holds the system where it "
         f"is. At <b>{name}</b> it is {number(needed)}{unit}{', for nothing pulls there' if not needed else ''}.</p>"
         "<p>The right way to dp/dt needs no step: p depends on q and q̇, which change at the rates q̇ and q̈. So, by the "
         f"{term('chain rule')},</p><p class=\"display\">dp/dt = (∂p/∂q) q̇ + (∂p/∂q̇) q̈,</p><p>"
@@ -68,7 +70,7 @@ def check(subject: Subject) -> Screen:
         "both agree? Where is the difference the largest? Blue bars: by the chain rule; vermillion: by definition.",
         subject.play(
             "step",
-            {"right": right, "wrong": wrong, **({"terms": subject.verdict.terms} if subject.verdict.terms else {})},
+            {"right": right, "wrong": wrong, "terms": terms},
             sliders=subject.sliders(("q", "qd", "qdd") if few else ("q",)),
             joints=joints,
             joint=subject.joint,
@@ -91,10 +93,8 @@ def _choices(needed: float, given: float, unit: str) -> tuple[tuple[str, ...], i
     return tuple([f"{number(value)}{unit}{words.get(value, '')}" for value in values]), answer
 
 
-def _at_rest(subject: Subject, held: Array, still: dict[str, float]) -> str:
+def _at_rest(subject: Subject, terms: Graph, held: Array, still: dict[str, float]) -> str:
     """What Lagrange's equation says of rest: that alone where L depends on time or other forces act."""
-    terms = subject.verdict.terms
-    assert terms is not None
     pulled = held + subject.evaluate(terms, **still)
     if np.abs(pulled).max() <= ROUNDING * max(float(np.abs(held).max()), np.finfo(float).tiny):
         return "Then p does not change, and Lagrange’s equation leaves τ = −∂L/∂q:"
@@ -125,13 +125,9 @@ def _second_try(subject: Subject) -> str:
 def _sizes(subject: Subject) -> str:
     """The sizes of the graphs, for those who ask."""
     sizes = size_table(formulation_sizes(subject.system)).html()
-    why = (
-        f"<p>{in_letters(subject.verdict.lacking) or WHY_FEWER.replace('torque', subject.force)}</p>"
-        * subject.verdict.differs
-    )
-    pictures = _pictures(subject)
-    why = why.replace("spurious", term("spurious"), 1)
-    return f"<details><summary>How large the graphs are, and how much of them is there by mistake</summary>{sizes}{why}{pictures}</details>"
+    why = in_letters(subject.verdict.lacking) or WHY_FEWER.replace("torque", subject.force)
+    told = f"<p>{why.replace('spurious', term('spurious'), 1)}</p>" if subject.verdict.differs else ""
+    return f"<details><summary>How large the graphs are, and how much of them is there by mistake</summary>{sizes}{told}{_pictures(subject)}</details>"
 
 
 def _pictures(subject: Subject) -> str:
@@ -145,8 +141,7 @@ def _pictures(subject: Subject) -> str:
             legend = legend_svg(kinds_in(graph, marked=wrong))
             pictures = Picture("", to_adaptive(legend), "The colors of both pictures.", None).html()
         svg = subject.svg(plain_drawing(graph, subject.names, wrong, edges))
-        caption = (
-            f"The inertial term, {TITLES[formulation]}: {len(wrong)} of {len(graph.nodes)} nodes are there by mistake."
-        )
+        counts = f"{len(wrong)} of {len(graph.nodes)} nodes"
+        caption = f"The inertial term, {TITLES[formulation]}: {counts} are there by mistake."
         pictures += Picture("", to_adaptive(svg), caption, None).html()
     return pictures

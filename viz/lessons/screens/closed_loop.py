@@ -1,13 +1,9 @@
 """A loop closes: a constraint as an unknown force, the multiplier, found with the accelerations."""
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np
 
-from cgraph import Node
-from cgraph._shared import Array
 from dynamics import System, forward_dynamics, gravity_force
 
 from ...pages.document import Table
@@ -29,7 +25,8 @@ def closed_loop(subject: Subject) -> Screen:
     free = subject.evaluate(free_graph, **still)
     answer = dict(zip(held_graph.outputs, subject.evaluate(held_graph, **still).tolist(), strict=True))
     weights = subject.evaluate(gravity_force(subject.system))
-    rounding = ROUNDING * float(np.abs(weights).max(initial=0.0))
+    heaviest = float(np.abs(weights).max(initial=0.0))
+    rounding = ROUNDING * heaviest
     multipliers = [answer[name] if abs(answer[name]) > rounding else 0.0 for name in names]
     first = multipliers[0]
     weight = f"<b>{escape(shown[0])}</b>"
@@ -38,8 +35,9 @@ def closed_loop(subject: Subject) -> Screen:
     choices, right = _choices(first, static, unit)
     many = subject.system.n > 1 and not own
     still_held = np.array([answer[f"qdd{i}"] for i in range(subject.system.n)])
-    rows = [[joint, *map(number, pair)]
-            for joint, *pair in zip(subject.joints[:SHOWN], *_without_rounding(free, still_held), strict=False)]  # fmt: skip
+    both = np.stack([free[: len(still_held)], still_held])
+    both[np.abs(both) <= ROUNDING * np.abs(both).max()] = 0.0
+    rows = [[joint, *map(number, pair)] for joint, pair in zip(subject.joints[:SHOWN], both.T, strict=False)]
     sliders = [] if own else subject.sliders()
     play = subject.play(
         "loop",
@@ -49,7 +47,7 @@ def closed_loop(subject: Subject) -> Screen:
         joints=subject.joints[:SHOWN],
         multipliers=dict(zip(names, shown, strict=True)),
         rounding=ROUNDING,
-        force=float(np.abs(weights).max(initial=0.0)),
+        force=heaviest,
     )
     last = escape(subject.joints[-1])
     return Screen(
@@ -77,30 +75,16 @@ def closed_loop(subject: Subject) -> Screen:
     )  # fmt: skip
 
 
-def _without_rounding(free: Array, held: Array) -> list[list[float]]:
-    """Accelerations (n,), those that are rounding beside the largest as 0."""
-    both = np.stack([free[: len(held)], held])
-    both[np.abs(both) <= ROUNDING * np.abs(both).max()] = 0.0
-    return [row.tolist() for row in both]
-
-
 def _clamped(system: System) -> System:
     """The system with its last velocity held at zero."""
-
-    def row(q: list[Node], qd: list[Node], t: Node) -> list[Node]:
-        return [qd[-1]]
-
-    def forces(*_: object) -> list[Node]:
-        return list(system.forces)
-
     return System(
         lambda *_: list(system.partial_lagrangians),
         system.coordinates,
         system.parameters,
-        forces=forces,
+        forces=lambda *_: list(system.forces),
         damping=list(system.damping),
         quasi_velocities=system.kinematics.quasi,
-        velocity_constraints=row,
+        velocity_constraints=lambda q, qd, t: [qd[-1]],
     )
 
 

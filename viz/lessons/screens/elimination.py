@@ -61,11 +61,7 @@ def elimination(subject: Subject) -> Screen:
         + f" cgraph does this on the graph of L itself: the accelerations of this system take {counted(size, 'node')}.</p>"
         + Table("Inertia", [one, "all others locked" if n > 1 else "M", "pivot"], rows).html(),
         f"The pivot is {number(free)}."
-        + (
-            " A door with a second door hinged to it is easier to push than one with both in line and welded."
-            if n > 1
-            else ""
-        ),
+        + " A door with a second door hinged to it is easier to push than one with both in line and welded." * (n > 1),
         ""
         if n == 1
         else f"Take out one {one} after the other, the last first. Orange: the pivot. Then move the system and start again."

@@ -22,8 +22,6 @@ STEPS, FINE = (300, 100, 30, 10), 16  # of the coarse motion, and how many of th
 LONGEST_MOTION, HALVINGS = 1.0, 20  # s, of the motion whose order is measured, and how often it is halved
 ROUNDING_ERROR = 1e-12  # of the largest coordinate: an error that says nothing about a method
 SMALL_ERROR = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
-
-
 _BRAKED = " This system is damped or driven, so its energy does change: the dashed line is what a method should follow."
 
 
@@ -104,7 +102,7 @@ class Measured(NamedTuple):
         if self.errors[2] <= self.rounding:
             return f"At half the step nothing but rounding is left, so there is no factor to be measured. {order}"
         factor = f"Measured here: a factor of {number(self.errors[1] / self.errors[2])}."
-        usual = FACTORS[self.answer] == 16 if self.answer < len(FACTORS) else False
+        usual = self.answer == FACTORS.index(16)
         return f"{order} {factor}" if usual else f"{factor} Where the rate is smooth one would expect 16. {order}"
 
 

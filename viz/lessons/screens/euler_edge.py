@@ -79,15 +79,13 @@ def _figure(subject: Subject) -> Figure:
     edges = [edge for edge in graph.edges if COUPLING in edge.target.tags and edge.source.name != "dt"]
     into = [edge for edge in graph.edges if COUPLING in edge.source.tags]
     plain, marked = (
-        subject.svg(
-            to_dot(graph, names=subject.names, collapse=[INSIDE], clusters=False, legend=False, marked_edges=each)
-        )
+        to_dot(graph, names=subject.names, collapse=[INSIDE], clusters=False, legend=False, marked_edges=each)
         for each in ((), [*edges, *into])
     )
     one = f" Of {subject.system.n} coordinates one is drawn; the others are alike." if subject.system.n > DRAWN else ""
     return Figure(
-        plain,
-        marked,
+        subject.svg(plain),
+        subject.svg(marked),
         f"A step of length dt, and L of the state after it. Inputs are at the bottom, L is at the top.{one}",
         "Draw over the edges by which a velocity q̇ reaches a coordinate q. Then draw, in another color, the way of "
         "the slope from L back to q̇ through q.",

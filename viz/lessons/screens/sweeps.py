@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from html import escape
-from typing import TYPE_CHECKING
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -17,10 +17,7 @@ from ...graph_drawing.dot import to_dot
 from ...graph_drawing.levels import levels_of
 from ..glossary import term
 from ..screen import Figure, Screen
-from ..subject import Subject, inline, lagrangian_graph, number
-
-if TYPE_CHECKING:
-    from graphviz import Digraph
+from ..subject import Subject, lagrangian_graph, number
 
 # fmt: off   (a table of rules)
 RULES = {
@@ -36,6 +33,7 @@ RULES = {
 OTHERS = "any other operation passes on its slope times its own derivative"
 ROWS = 60  # nodes that the page walks through
 DRAWN = 40  # nodes, at most, of a graph that is drawn
+SIGNS = {"values": " = ", "slopes": ": slope ", "rates": ": rate "}  # in the picture, before what a sweep finds
 PUSH = 0.1  # by which a coordinate is changed
 
 
@@ -77,20 +75,14 @@ def formula_graph(subject: Subject) -> Screen:
         "to the other. Keep this in mind.</p>",
         f"L is {number(before)} in this moment.",
         f"Press Next and watch the values go up{_as_drawn(graph)} from the inputs to L.{_left_out(graph)}",
-        {"kind": "sweeps", "rows": _rows(subject, graph, "values"), "slopes": False, "rates": False},
-        _picture(subject, graph, "values"),
-        _figure(
+        *_walk(
             subject,
             graph,
-            {},
+            "values",
             _values(subject, graph),
-            "",
-            " = ",
-            (
-                "The graph of L. Inputs are at the bottom.",
-                "Write the value of every node beside it, from the bottom to the top, with four digits.",
-                "The values of all nodes.",
-            ),
+            "The graph of L. Inputs are at the bottom.",
+            "Write the value of every node beside it, from the bottom to the top, with four digits.",
+            "The values of all nodes.",
         ),
     )
 
@@ -117,20 +109,14 @@ def backward_sweep(subject: Subject) -> Screen:
         "is one number.",
         f"Step through both sweeps, values upwards, then slopes downwards{_as_drawn(graph, '')}. Multiply a few of the slopes "
         f"by hand.{_left_out(graph)}",
-        {"kind": "sweeps", "rows": _rows(subject, graph, "slopes", slopes), "slopes": True, "rates": False},
-        _picture(subject, graph, "slopes"),
-        _figure(
+        *_walk(
             subject,
             graph,
-            _values(subject, graph),
+            "slopes",
             slopes,
-            " = ",
-            ": slope ",
-            (
-                "The graph of L, with the values of all nodes.",
-                "Write the slope of L by every node beside it, from the top to the bottom, with four digits. Begin with 1 at the top.",
-                "The slopes of L by all nodes. At the bottom are ∂L/∂q and p = ∂L/∂q̇.",
-            ),
+            "The graph of L, with the values of all nodes.",
+            "Write the slope of L by every node beside it, from the top to the bottom, with four digits. Begin with 1 at the top.",
+            "The slopes of L by all nodes. At the bottom are ∂L/∂q and p = ∂L/∂q̇.",
         ),
     )
 
@@ -138,9 +124,9 @@ def backward_sweep(subject: Subject) -> Screen:
 def forward_sweep(subject: Subject) -> Screen:
     """The screen on the rate of the momentum."""
     graph = cg.simplify(momentum(subject.system))
-    rates = _rates(subject, graph)
     counts = {name: len(inverse_dynamics(subject.system, name).nodes) for name in ("chain_rule", "chain_rule_literal")}
     swept, written = counts.values()
+    few = " With one coordinate the table has little in it, so there is little to be saved." * (subject.system.n == 1)
     return Screen(
         "forward-sweep",
         "Forward: a rate in one sweep",
@@ -156,25 +142,21 @@ def forward_sweep(subject: Subject) -> Screen:
         f"The graph of τ with every slope written out has {counted(written, 'node')}. The one by a forward sweep has …",
         ("fewer", "as many", "more"),
         0 if swept < written else 1 if swept == written else 2,
-        f"<p>{counted(swept, 'node')} for {written}."
-        + (
-            " With one coordinate the table has little in it, so there is little to be saved."
-            if subject.system.n == 1
-            else ""
-        )
-        + " q and q̇ stay two separate inputs: there is no dt and no earlier state.</p>",
+        f"<p>{counted(swept, 'node')} for {written}.{few} q and q̇ stay two separate inputs: there is no dt and no earlier state.</p>",
         "Both are right, to the last digits; they differ in size alone.",
         f"Press Next: every node of p computes its value and, with it, its rate{_as_drawn(graph, '')}. The inputs q and q̇ have the "
         f"rates q̇ and q̈, a parameter has 0, and at p stands dp/dt. Work a few of the rates out by hand.{_left_out(graph)}",
-        {"kind": "sweeps", "rows": _rows(subject, graph, "rates", rates=rates), "slopes": False, "rates": True},
-        _picture(subject, graph, "rates"),
-        _figure(subject, graph, _values(subject, graph), rates, " = ", ": rate ", (
+        *_walk(
+            subject,
+            graph,
+            "rates",
+            _rates(subject, graph),
             "The graph of p, with the values of all nodes. Inputs are at the bottom.",
-            ("Write the rate of every node beside it, from the bottom to the top, with four digits. Begin with q̇ at q and q̈ at q̇; "
-            "a parameter has the rate 0."),
+            "Write the rate of every node beside it, from the bottom to the top, with four digits. Begin with q̇ at q and q̈ at q̇; "
+            "a parameter has the rate 0.",
             "The rates of all nodes. At the top is dp/dt.",
-        )),
-    )  # fmt: skip
+        ),
+    )
 
 
 def _rules(graph: Graph) -> str:
@@ -219,48 +201,37 @@ def _told_picture(graph: Graph) -> str:
     return f"<p>With {len(graph.nodes)} nodes the graph is too large for a picture here; {told}.</p>" if many else ""
 
 
-def _picture(subject: Subject, graph: Graph, name: str) -> str:
-    """The graph of L to light up, where it is small enough."""
-    if len(graph.nodes) > DRAWN:
-        return ""
-    return inline(subject.svg(_drawing(graph, subject.names, _called(graph))), name, "The graph, inputs at the bottom")
+def _walk(
+    subject: Subject, graph: Graph, kind: str, found: Mapping[Node, float], caption: str, task: str, answer: str
+) -> tuple[dict[str, object], str, Figure | None]:
+    """The play of a sweep, its picture and its figure, which are there where the graph is small enough.
 
-
-def _figure(
-    subject: Subject,
-    graph: Graph,
-    given: Mapping[Node, float],
-    found: Mapping[Node, float],
-    known: str,
-    sign: str,
-    words: tuple[str, str, str],
-) -> Figure | None:
-    """The graph to write `found` at, beside what is given, after these signs.  words: its caption, the task, and the answer."""
+    kind: what the sweep finds, of `SIGNS`.  found: this of every node.  task: what to write on paper.
+    """
+    rows = _rows(subject, graph, kind, found)
+    play = {"kind": "sweeps", "rows": rows, "slopes": kind == "slopes", "rates": kind == "rates"}
     if len(graph.nodes) > DRAWN:
-        return None
+        return play, "", None
     called = _called(graph)
     names = {**called, **{node: subject.shown(str(node.name)) for node in graph.nodes if not node.args and node.name}}
 
-    def drawn(at: Mapping[Node, float], after: str) -> str:
-        texts = {node: f"{names[node]}{after}{number(at[node])}" for node in names if node in at}
+    def drawn(at: Mapping[Node, float], sign: str) -> str:
+        texts = {node: f"{names[node]}{sign}{number(at[node])}" for node in names if node in at}
         inputs = {str(node.name): text for node, text in texts.items() if not node.args}
-        return subject.svg(_drawing(graph, {**subject.names, **inputs}, {**called, **texts}))
+        formulas = {node: text for node, text in {**called, **texts}.items() if node.args}
+        return subject.svg(
+            to_dot(graph, names={**subject.names, **inputs}, formulas=formulas, clusters=False, legend=False)
+        )
 
-    caption, task, answer = words
-    return Figure(drawn(given, known), drawn(found, sign), f"{caption}{_signs(graph)}", task, answer)
-
-
-def _signs(graph: Graph) -> str:
-    """What signs in the picture mean, of those that are in it."""
-    ops = {node.op for node in graph.nodes if node.args}
-    ordered = any([op.arity > 1 and not op.commutative for op in ops])
-    power = any([op.name == "pow" for op in ops])
-    return " The numbers 1 and 2 at edges tell arguments apart." * ordered + " xʸ is a power." * power
-
-
-def _drawing(graph: Graph, names: Mapping[str, str], at: Mapping[Node, str]) -> Digraph:
-    operations = {node: text for node, text in at.items() if node.args}
-    return to_dot(graph, names=names, formulas=operations, clusters=False, legend=False)
+    ops = {node.op for node in called}
+    if any([op.arity > 1 and not op.commutative for op in ops]):
+        caption += " The numbers 1 and 2 at edges tell arguments apart."
+    if any([op.name == "pow" for op in ops]):
+        caption += " xʸ is a power."
+    plain = drawn({} if kind == "values" else _values(subject, graph), SIGNS["values"])
+    svg = re.sub(r'\bid="', f'id="{kind}-', drawn({}, ""))  # the page's script lights up nodes by their ids
+    picture = f'<div class="graph-picture" role="img" aria-label="The graph, inputs at the bottom">{svg}</div>'
+    return play, picture, Figure(plain, drawn(found, SIGNS[kind]), caption, task, answer)
 
 
 def _called(graph: Graph) -> dict[Node, str]:
@@ -298,13 +269,7 @@ def _evaluated(subject: Subject, graph: Graph, nodes: Mapping[Node, Node]) -> di
     return dict(zip(nodes, found.tolist(), strict=True))
 
 
-def _rows(
-    subject: Subject,
-    graph: Graph,
-    picture: str,
-    slopes: Mapping[Node, float] | None = None,
-    rates: Mapping[Node, float] | None = None,
-) -> list[dict[str, object]]:
+def _rows(subject: Subject, graph: Graph, kind: str, swept: Mapping[Node, float]) -> list[dict[str, object]]:
     """The nodes from the bottom of the picture up: formula, value, slope of L or rate, and what an input's slope is."""
     ends = {node: name if name == "L" else subject.shown(name) for name, node in graph.outputs.items() if node.args}
     levels, place = levels_of(graph), {node: k for k, node in enumerate(graph.nodes)}
@@ -312,17 +277,17 @@ def _rows(
     nodes = sorted(values, key=lambda node: (levels[node], place[node]))[-ROWS:]
     called = {**{node: subject.shown(str(node.name)) for node in nodes if not node.args}, **_called(graph)}
 
-    def finite(found: Mapping[Node, float] | None, node: Node) -> float | None:
-        return found[node] if found is not None and math.isfinite(found[node]) else None
+    def finite(found: Mapping[Node, float], node: Node) -> float | None:
+        return found[node] if math.isfinite(found[node]) else None
 
     return [
         {
             "node": ends.get(node, called[node]),
-            "box": f"{picture}-n{place[node]}",
+            "box": f"{kind}-n{place[node]}",
             "text": _text(node, called) if node.args else "",
             "value": finite(values, node),
-            "slope": finite(slopes, node),
-            "rate": finite(rates, node),
+            "slope": finite(swept, node) if kind == "slopes" else None,
+            "rate": finite(swept, node) if kind == "rates" else None,
             "what": _what(node),
         }
         for node in nodes

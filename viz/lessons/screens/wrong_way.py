@@ -27,7 +27,6 @@ def wrong_way(subject: Subject) -> Screen:
     answer = _answer(subject, errors, torque)
     k = subject.watched
     name = escape(subject.joints[k])
-    slope = f"∂L/∂q.{subject.joints[k]}"
     return Screen(
         "wrong-way",
         "The derivative goes the wrong way",
@@ -49,7 +48,7 @@ def wrong_way(subject: Subject) -> Screen:
             "There is no error, at any dt",
         ),
         answer,
-        _reveal(subject, answer, errors, slope, k),
+        _reveal(subject, answer, errors),
         f"At dt = 1e-6 s the error at {name} is {number(float(errors[-1][1][k]))}{subject.unit(f'tau{k}')}. "
         + (
             "Expect hands for “It vanishes with dt”: a smaller step cures almost every other error of a simulation."
@@ -95,8 +94,8 @@ def _momenta(subject: Subject) -> str:
     return Table(f"At dt = {subject.values['dt']:g} s, in this moment", header, rows).html()
 
 
-def _reveal(subject: Subject, answer: int, errors: list[tuple[float, Array]], slope: str, k: int) -> str:
-    joints = subject.joints[:SHOWN]
+def _reveal(subject: Subject, answer: int, errors: list[tuple[float, Array]]) -> str:
+    joints, k = subject.joints[:SHOWN], subject.watched
     rows = [[f"{dt:g}".replace("e-0", "e-"), *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
     unit = subject.unit(f"tau{k}").strip()
     steps = Table(f"Error of dp/dt by definition{unit and f' [{unit}]'}", ["dt [s]", *joints], rows).html()
@@ -107,20 +106,15 @@ def _reveal(subject: Subject, answer: int, errors: list[tuple[float, Array]], sl
         "vanishes with dt. The first does not have dt in it any more: by definition, dp/dt tends to dp/dt + <b>∂L/∂q</b>. "
     )
     if answer == VANISHES:
-        return (
-            f"{law}Here ∂L/∂q is zero in this moment, and so nothing of it is seen. {_everywhere(subject)}</p>{steps}"
-        )
+        elsewhere = "Where it is not zero, the error stays." if subject.verdict.differs else subject.verdict_text
+        return f"{law}Here ∂L/∂q is zero in this moment, and so nothing of it is seen. {elsewhere}</p>{steps}"
     terms = subject.verdict.terms
     assert terms is not None
     name = f"tau{k}"
-    shown = equations(Graph(terms.inputs, {name: terms.outputs[name]}), {**subject.names, name: slope})
+    shown = equations(
+        Graph(terms.inputs, {name: terms.outputs[name]}), {**subject.names, name: f"∂L/∂q.{subject.joints[k]}"}
+    )
     return (
         f"{law}At {escape(subject.joints[k])} the term that is too much is</p>{shown}<p>which is <b>{number(subject.slopes[k])}"
         f"{subject.unit(name)}</b> in this moment, the last line of the table.</p>{steps}"
     )
-
-
-def _everywhere(subject: Subject) -> str:
-    if not subject.verdict.differs:
-        return subject.verdict_text
-    return "Where it is not zero, the error stays."
