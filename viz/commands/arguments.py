@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sys
 import webbrowser
 from collections.abc import Mapping
 from contextlib import suppress
@@ -17,7 +16,7 @@ import dynamics as dyn
 from cgraph import _shared
 
 from . import library
-from .command import Command
+from .command import Command, say
 
 FORMULATIONS = (
     "by_definition",
@@ -74,12 +73,6 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
 def scene_of(options: argparse.Namespace) -> dyn.scenes.Scene:
     """The scene that the arguments name; what of a file is left out is a warning, a line of standard error."""
     return dyn.scenes.load(options.scene, **reading(options))
-
-
-def say(line: str) -> None:
-    """A line of progress or of warning, on standard error."""
-    if sys.stderr is not None:
-        print(f"cgraph: {line}", file=sys.stderr, flush=True)
 
 
 def unless_json(options: argparse.Namespace, data: object, text: object) -> str:

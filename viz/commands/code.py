@@ -37,9 +37,7 @@ def add(parser: Command) -> None:
     for name, about in (languages | {"python": "a Python function of a list"}).items():
         language.add_argument(f"--{name}", dest="language", action="store_const", const=name, help=about)
     parser.add_argument(
-        "--what",
-        choices=tuple(EQUATIONS),
-        help="default: forward_dynamics; of a first-order system state_equation",
+        "--what", choices=tuple(EQUATIONS), help="default: forward_dynamics; of a first-order system state_equation"
     )
     parser.add_argument(
         "--out", type=place, help="file to write, in place of standard output: .c (and .h), .mjs or .py"
@@ -55,7 +53,6 @@ def add(parser: Command) -> None:
         metavar="A=LOW:HIGH,...",
         help="inputs for which the bound of --float32 is stated, -1:1 if left out, parameters at their values",
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

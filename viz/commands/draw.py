@@ -33,7 +33,6 @@ def add(parser: Command) -> None:
         metavar="A,B",
         help="draw all nodes of a tag as one box (default: of all tags if a picture needs it); '' for none",
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -42,7 +42,6 @@ def add(parser: Command) -> None:
         "--at", type=point, metavar="A=1,B=2", help=f"look for sums that lose digits at this point; {REST}"
     )
     may_draw_and_print(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

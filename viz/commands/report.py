@@ -25,11 +25,10 @@ from .arguments import (
     positive,
     reading,
     reads_files,
-    say,
     start,
     unless_json,
 )
-from .command import Command
+from .command import Command, say
 
 CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
 
@@ -54,10 +53,7 @@ def add(parser: Command) -> None:
         "effects": lambda: dyn.EFFECTS,
     }
     parser.add_argument(
-        "scenes",
-        nargs="*",
-        metavar="SCENE",
-        help=f"{{scenes}}, a model file, MJCF or URDF, a case, or {IN_PYTHON}",
+        "scenes", nargs="*", metavar="SCENE", help=f"{{scenes}}, a model file, MJCF or URDF, a case, or {IN_PYTHON}"
     )
     parser.add_argument(
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
@@ -76,7 +72,7 @@ def add(parser: Command) -> None:
     parser.add_argument(
         "--lock", type=_locked, action="append", metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
     )
-    parser.set_defaults(run=run, words="scenes")
+    parser.set_defaults(words="scenes")
 
 
 def run(options: argparse.Namespace) -> int | None:

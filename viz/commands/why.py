@@ -56,7 +56,6 @@ def add(parser: Command) -> None:
     )
     parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"at which state; {REST}")
     may_draw_and_print(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int | None:
