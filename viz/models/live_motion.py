@@ -156,11 +156,17 @@ def _first_order(scene: Scene) -> Live:
     values = dict(zip(scene.coordinates, scene.q, strict=True)) | dict(scene.parameters)
     start = {name: float(values.get(name, 0.0)) for name in rate.input_names}  # the time is 0
     sides, of_sides = _sides(scene)
-    meters, shown = (
-        [(f"d {name}/dt", "", "rate") for name in scene.coordinates],
+    meters = [*[(f"d {name}/dt", "", "rate") for name in scene.coordinates], *of_sides]
+    return Live(
+        rate,
+        start,
         Graph(rate.inputs, rate.outputs | sides),
+        meters,
+        dt=_step(scene),
+        methods=TABLEAUS,
+        units={"t": "s"},
+        notes=NOTES,
     )
-    return Live(rate, start, shown, meters + of_sides, dt=_step(scene), methods=TABLEAUS, units={"t": "s"}, notes=NOTES)
 
 
 def _sides(scene: Scene, form: str = "velocity") -> tuple[dict[str, Node], list[tuple[str, str, str]]]:
