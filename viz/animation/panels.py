@@ -127,9 +127,9 @@ def sticks(
             _put(balls, [line for sphere in seen.spheres for line in sphere])
             _put(tip, [motion.values[max(0, k - TRACE) : k + 1, count - 1]])
             if wanted is not None:
-                _put(ghost, [wanted[k, [parents[i], i]] for i in np.flatnonzero(held)])
+                _put(ghost, [wanted[k, [hung_on[i], i]] for i in np.flatnonzero(held)])
             for c in range(len(paint)):
-                _put(rods[c], [points[[parents[i], i]] for i in np.flatnonzero(held & (shade == c))])
+                _put(rods[c], [points[[hung_on[i], i]] for i in np.flatnonzero(held & (shade == c))])
                 _put(dots[c], [points[shade == c]])
 
         return move

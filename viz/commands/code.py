@@ -77,7 +77,11 @@ def run(options: argparse.Namespace) -> None:
     elif options.language == "python":
         files = {suffix: python_text(graph)}
     else:
-        single = _single(options, scene, graph)
+        single: dict[str, Any] = {}
+        if options.float32:  # parameters have their values unless the box has another range
+            values = {name: value for name, value in scene.parameters.items() if name in graph.input_names}
+            ranges = library.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
+            single = {"dtype": "float32", "box": values | ranges}
         try:
             text = cg.to_c(graph, name, methods, names=dyn.display_names(scene), **single)
         except ValueError as error:
@@ -90,15 +94,6 @@ def run(options: argparse.Namespace) -> None:
     written = {out.with_suffix(end): content for end, content in files.items()}
     sizes = ", ".join(f"{path}: {len(content)} bytes" for path, content in written.items())
     answer(sizes, written)
-
-
-def _single(options: argparse.Namespace, scene: dyn.scenes.Scene, graph: cg.Graph) -> dict[str, Any]:
-    """Options of C in float; parameters have their values unless the box has another range."""
-    if not options.float32:
-        return {}
-    values = {name: value for name, value in scene.parameters.items() if name in graph.input_names}
-    ranges = library.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
-    return {"dtype": "float32", "box": values | ranges}
 
 
 def python_text(graph: cg.Graph) -> str:

@@ -21,7 +21,6 @@ from .arguments import (
     takes_a_scene,
     takes_equations,
     unless_json,
-    verdict_of,
 )
 from .command import Command
 from .points import REST, SHOWN, filled, point_text
@@ -69,8 +68,7 @@ def run(options: argparse.Namespace) -> int | None:
         raise ValueError("--svg draws the paths from INPUT: name one, as in `why SCENE tau0 q1`")
     check_picture(options)
     scene = scene_of(options)
-    verdict = verdict_of(options, scene)
-    graph, _ = equations_of(options, scene, verdict)
+    graph, _, verdict = equations_of(options, scene)
     names = library.Names(graph, dyn.display_names(scene))
     at = filled(graph, scene, options.at)
     if options.nan:

@@ -23,7 +23,6 @@ from dynamics.integrators import TABLEAUS, derive, in_form
 from dynamics.integrators.rate_in_modes import switched
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.multibody.trees.joint_positions import contact_surfaces, drawn_points, view
-from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.simulation.simulate import simulate
@@ -136,8 +135,30 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
 
 
 def adjustable(scene: Scene) -> Scene:
-    """The scene that the page computes: of a small mechanism without parameters, masses and gravity are some."""
-    return scene if scene.mechanism is None else replace(scene, model=_adjustable(scene.mechanism))
+    """The scene that the page computes: of a small mechanism without parameters, masses and gravity are some.
+
+    Inertias are in proportion to the masses.
+    """
+    mechanism = scene.mechanism
+    if mechanism is None:
+        return scene
+    numbers = [*[body.mass for body in mechanism.bodies], *np.ravel(np.array(mechanism.gravity, dtype=object))]
+    if mechanism.parameters or len(mechanism.moving) > MOST_BODIES or not all(map(_is_number, numbers)):
+        return replace(scene, model=mechanism)
+    gravity = np.array(mechanism.gravity, dtype=np.float64)
+    size = float(np.linalg.norm(gravity))
+    bodies, parameters = [], {"g": size} if size else {}
+    for body in mechanism.bodies:
+        inertia = np.array(body.inertia, dtype=object)
+        name = f"mass.{'_'.join(body.name.split())}"
+        if body.mass and name not in parameters and all(map(_is_number, inertia.ravel())):
+            mass, parameters[name] = cg.variable(name), float(body.mass)
+            scaled = [[each and each / body.mass * mass for each in row] for row in np.atleast_2d(inertia)]
+            body = replace(body, mass=mass, inertia=scaled if inertia.ndim == 2 else scaled[0])
+        bodies.append(body)
+    down = [float(part / size) * cg.variable("g") if part else 0.0 for part in gravity]
+    adjusted = replace(mechanism, bodies=bodies, gravity=down if size else mechanism.gravity, parameters=parameters)
+    return replace(scene, model=adjusted)
 
 
 def _limits(scene: Scene) -> dict[str, tuple[float, float]]:
@@ -175,26 +196,6 @@ def _sides(scene: Scene, form: str = "velocity") -> tuple[dict[str, Node], list[
     if switches is None:
         return {}, []
     return {f"side{k}": each for k, each in enumerate(switches.sides)}, [(each, "", "side") for each in switches.words]
-
-
-def _adjustable(mechanism: Mechanism) -> Mechanism:
-    """The mechanism, with its masses (inertias in proportion) and the size of gravity as parameters."""
-    numbers = [*[body.mass for body in mechanism.bodies], *np.ravel(np.array(mechanism.gravity, dtype=object))]
-    if mechanism.parameters or len(mechanism.moving) > MOST_BODIES or not all(map(_is_number, numbers)):
-        return mechanism
-    gravity = np.array(mechanism.gravity, dtype=np.float64)
-    size = float(np.linalg.norm(gravity))
-    bodies, parameters = [], {"g": size} if size else {}
-    for body in mechanism.bodies:
-        inertia = np.array(body.inertia, dtype=object)
-        name = f"mass.{'_'.join(body.name.split())}"
-        if body.mass and name not in parameters and all(map(_is_number, inertia.ravel())):
-            mass, parameters[name] = cg.variable(name), float(body.mass)
-            scaled = [[each and each / body.mass * mass for each in row] for row in np.atleast_2d(inertia)]
-            body = replace(body, mass=mass, inertia=scaled if inertia.ndim == 2 else scaled[0])
-        bodies.append(body)
-    down = [float(part / size) * cg.variable("g") if part else 0.0 for part in gravity]
-    return replace(mechanism, bodies=bodies, gravity=down if size else mechanism.gravity, parameters=parameters)
 
 
 def _is_number(value: object) -> bool:
