@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from .commands.command import parse
+from .commands.command import parse, say
 
 SUCCESS, FINDING, ERROR, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141  # exit statuses, as docs/commands.md has them
 ERRORS = (ValueError, TypeError, OSError, ImportError, RuntimeError, MemoryError, ArithmeticError)
@@ -51,13 +51,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, SystemExit) as error:
         if isinstance(error, SystemExit) and error.code != INTERRUPTED:
             raise
-        _say("interrupted")
+        say("interrupted")
         return INTERRUPTED
     except ERRORS as error:
         _discard_output()
         if isinstance(error, BrokenPipeError):  # the reader, such as `head`, has had enough
             return UNREAD
-        _say(f"error: {' '.join(_sentence(error).split())}")
+        say(f"error: {' '.join(_sentence(error).split())}")
         return ERROR
 
 
@@ -75,15 +75,10 @@ def _shown_warnings() -> Iterator[None]:
         def show(message: Warning | str, *_: object, **__: object) -> None:
             if str(message) not in shown:
                 shown.add(str(message))
-                _say(f"warning: {message}")
+                say(f"warning: {message}")
 
         warnings.showwarning = show
         yield
-
-
-def _say(line: str) -> None:
-    if sys.stderr is not None:
-        print(f"cgraph: {line}", file=sys.stderr, flush=True)
 
 
 def _discard_output() -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -64,122 +63,105 @@ class Motion:
     wrong: bool = False
 
 
-class FilmPanel(ABC):
-    """One kind of panel; all of a film share its scale.  wanted: as the motions' values, drawn faint, or None."""
+class FilmPanel(NamedTuple):
+    """One kind of panel; all of a film share its scale.
 
-    margins = (0.0, 0.0, 0.0, 0.0)  # inches: left, below, right and above the axes
+    draw: adds the artists of a motion to axes; the function that it gives moves them to a row.
+    margins: left, below, right and above the axes [inches].
+    """
 
-    def __init__(self, motions: Sequence[Motion], wanted: Array | None) -> None:
-        self.motions, self.wanted = motions, wanted
-        self.all = np.concatenate([motion.values for motion in motions] + ([] if wanted is None else [wanted]))
-
-    @abstractmethod
-    def draw(self, axis: Axes, motion: Motion, colors: Colors) -> Callable[[int], None]:
-        """Add the artists of a motion; the function moves them to a row."""
+    motions: Sequence[Motion]
+    draw: Callable[[Axes, Motion, Colors], Callable[[int], None]]
+    margins: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
-class Sticks(FilmPanel):
+def sticks(
+    motions: Sequence[Motion], wanted: Array | None, parents: Sequence[int], radii: Sequence[float] = ()
+) -> FilmPanel:
     """Points that move, as sticks from their parents, (k,), -1 for what hangs in the world.
 
     Behind the k points come those of spheres of these radii [m] and of planes, see `surfaces`.
+    wanted: as the motions' values, drawn faint, or None.
     """
+    count, hung_on = len(parents), np.asarray(parents)
+    joints, touching = np.split(_all(motions, wanted), [count], axis=1)
+    grounded = touching.shape[1] > 2 * len(radii)
+    size, centers = np.asarray(radii)[:, np.newaxis], touching[:, : 2 * len(radii) : 2]
+    seen = np.concatenate([joints, centers - size, centers + size], axis=1)
+    low, high = np.minimum(seen.min(axis=(0, 1)), 0.0), np.maximum(seen.max(axis=(0, 1)), 0.0)
+    middles = (joints.min(axis=1) + joints.max(axis=1)) / 2.0
+    reach, way = float(np.abs(seen - middles[:, np.newaxis]).max()), float((high - low).max())
+    follows = way > FOLLOW * 2.0 * reach > 0.0
+    half = 1.5 * reach if follows else 0.54 * (way or 1.0)
 
-    def __init__(
-        self, motions: Sequence[Motion], wanted: Array | None, parents: Sequence[int], radii: Sequence[float] = ()
-    ) -> None:
-        super().__init__(motions, wanted)
-        self.parents, self.radii = np.asarray(parents), radii
-        joints, touching = np.split(self.all, [len(parents)], axis=1)
-        self.grounded = touching.shape[1] > 2 * len(radii)
-        size, centers = np.asarray(radii)[:, np.newaxis], touching[:, : 2 * len(radii) : 2]
-        seen = np.concatenate([joints, centers - size, centers + size], axis=1)
-        low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
-        low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
-        middles = (joints.min(axis=1) + joints.max(axis=1)) / 2.0
-        reach, way = float(np.abs(seen - middles[:, np.newaxis]).max()), float((high - low).max())
-        self.follows = way > FOLLOW * 2.0 * reach > 0.0
-        self.half = 1.5 * reach if self.follows else 0.54 * (way or 1.0)
-        self.center = (low + high) / 2.0
-
-    def draw(self, axis: Axes, motion: Motion, colors: Colors) -> Callable[[int], None]:
+    def draw(axis: Axes, motion: Motion, colors: Colors) -> Callable[[int], None]:
         """A ghost of what was wanted, the way of the tip, and the sticks."""
-        count, parents = len(self.parents), self.parents
         paint = [colors.wrong] if motion.wrong else list(colors.links)
         width = 3.6 if count < 12 else 2.2
-        shade = np.maximum(parents, 0) % len(paint)
-        held = parents >= 0
+        shade = np.maximum(hung_on, 0) % len(paint)
+        held = hung_on >= 0
         axis.set(xticks=[], yticks=[], aspect="equal")
         axis.spines[:].set_visible(False)
-        grids, ghost, edges, tip, balls = (
-            _line(axis, color=color, linewidth=wide)
-            for color, wide in (
-                (colors.faint, 0.4),
-                (colors.faint, width),
-                (colors.text, 1.1),
-                (paint[shade[-1]], 0.9),
-                (colors.text, 1.1),
-            )
-        )
-        if not (self.follows or self.grounded):
-            axis.plot([-0.07 * self.half, 0.07 * self.half], [0.0, 0.0], color=colors.text, linewidth=1.5)
-        sticks = [_line(axis, color=color, linewidth=width) for color in paint]
-        joints = [
+        grids, ghost = (_line(axis, color=colors.faint, linewidth=wide) for wide in (0.4, width))
+        edges = _line(axis, color=colors.text, linewidth=1.1)
+        tip = _line(axis, color=paint[shade[-1]], linewidth=0.9)
+        balls = _line(axis, color=colors.text, linewidth=1.1)
+        if not (follows or grounded):
+            axis.plot([-0.07 * half, 0.07 * half], [0.0, 0.0], color=colors.text, linewidth=1.5)
+        rods = [_line(axis, color=color, linewidth=width) for color in paint]
+        dots = [
             _line(axis, color=color, linestyle="", marker="o", markersize=1.4 * width, markerfacecolor=colors.page)
             for color in paint
         ]
-        step = _nice(0.6 * self.half)
+        step = _nice(0.6 * half)
 
         def move(k: int) -> None:
             points, touching = np.split(motion.values[k], [count])
-            center = (points.min(axis=0) + points.max(axis=0)) / 2.0 if self.follows else self.center
-            axis.set_xlim(center[0] - self.half, center[0] + self.half)
-            axis.set_ylim(center[1] - self.half, center[1] + self.half)
-            seen = surfaces(touching, self.radii, center, self.half, step)
-            still = grid(np.zeros(2), np.eye(2), center, self.half, step)  # in the world, while the frame goes along
-            _put(grids, still if self.follows and not seen.grids else seen.grids)
+            center = (points.min(axis=0) + points.max(axis=0)) / 2.0 if follows else (low + high) / 2.0
+            axis.set_xlim(center[0] - half, center[0] + half)
+            axis.set_ylim(center[1] - half, center[1] + half)
+            seen = surfaces(touching, radii, center, half, step)
+            still = grid(np.zeros(2), np.eye(2), center, half, step)  # in the world, while the frame goes along
+            _put(grids, still if follows and not seen.grids else seen.grids)
             _put(edges, seen.edges)
             _put(balls, [line for sphere in seen.spheres for line in sphere])
             _put(tip, [motion.values[max(0, k - TRACE) : k + 1, count - 1]])
-            if self.wanted is not None:
-                _put(ghost, [self.wanted[k, [parents[i], i]] for i in np.flatnonzero(held)])
+            if wanted is not None:
+                _put(ghost, [wanted[k, [hung_on[i], i]] for i in np.flatnonzero(held)])
             for c in range(len(paint)):
-                _put(sticks[c], [points[[parents[i], i]] for i in np.flatnonzero(held & (shade == c))])
-                _put(joints[c], [points[shade == c]])
+                _put(rods[c], [points[[hung_on[i], i]] for i in np.flatnonzero(held & (shade == c))])
+                _put(dots[c], [points[shade == c]])
 
         return move
 
+    return FilmPanel(motions, draw)
 
-class Curves(FilmPanel):
+
+def curves(motions: Sequence[Motion], wanted: Array | None, names: Sequence[str], t: Array) -> FilmPanel:
     """Coordinates over time: what has been, and where each is now.  names: of the curves, (m,).  t: (T,) [s]."""
+    shown = _all(motions, wanted)[:, :NAMED]
+    low, high = float(shown.min()), float(shown.max())
+    largest = max(abs(low), abs(high))
+    if largest > 1.0 / SMALLEST:
+        raise ValueError(f"coordinates up to {largest:.3g} are too large to be drawn")
+    if high - low <= max(CURVE_ROUNDING * largest, SMALLEST):  # nothing moves
+        pad = 0.5 * (largest if largest > SMALLEST else 1.0)
+        low, high = low - pad, high + pad
 
-    margins = (0.6, 0.25, 0.7, 0.1)
-
-    def __init__(self, motions: Sequence[Motion], wanted: Array | None, names: Sequence[str], t: Array) -> None:
-        super().__init__(motions, wanted)
-        self.names, self.t = names[:NAMED], t
-        shown = self.all[:, :NAMED]
-        self.low, self.high = float(shown.min()), float(shown.max())
-        largest = max(abs(self.low), abs(self.high))
-        if largest > 1.0 / SMALLEST:
-            raise ValueError(f"coordinates up to {largest:.3g} are too large to be drawn")
-        if self.high - self.low <= max(CURVE_ROUNDING * largest, SMALLEST):  # nothing moves
-            pad = 0.5 * (largest if largest > SMALLEST else 1.0)
-            self.low, self.high = self.low - pad, self.high + pad
-
-    def draw(self, axis: Axes, motion: Motion, colors: Colors) -> Callable[[int], None]:
+    def draw(axis: Axes, motion: Motion, colors: Colors) -> Callable[[int], None]:
         """Axes with their numbers, and the curves up to a row."""
-        axis.set(xlim=(self.t[0], self.t[-1]), ylim=(self.low, self.high))
+        axis.set(xlim=(t[0], t[-1]), ylim=(low, high))
         axis.locator_params(nbins=4)
         axis.xaxis.set_major_formatter("{x:g} s")
         axis.tick_params(colors=colors.text, labelsize=SMALL, length=0.0)
         axis.grid(axis="y", color=colors.faint, linewidth=0.4)
         axis.spines[:].set_visible(False)
-        curves, dots = [], []
-        for i, name in enumerate(self.names):
+        drawn, dots = [], []
+        for i, name in enumerate(names[:NAMED]):
             color = colors.wrong if motion.wrong else colors.series[i % len(colors.series)]
-            if self.wanted is not None:
-                axis.plot(self.t, self.wanted[:, i], color=colors.faint, linewidth=1.8)
-            curves.append(_line(axis, color=color, linewidth=1.5, label=name, clip_on=False))
+            if wanted is not None:
+                axis.plot(t, wanted[:, i], color=colors.faint, linewidth=1.8)
+            drawn.append(_line(axis, color=color, linewidth=1.5, label=name, clip_on=False))
             dots.append(_line(axis, color=color, marker="o", markersize=5.0, clip_on=False))
         axis.legend(
             loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=SMALL, labelcolor="linecolor",
@@ -187,11 +169,13 @@ class Curves(FilmPanel):
         )  # fmt: skip
 
         def move(k: int) -> None:
-            for i, (curve, dot) in enumerate(zip(curves, dots, strict=True)):
-                curve.set_data(self.t[: k + 1], motion.values[: k + 1, i])
-                dot.set_data(self.t[k : k + 1], motion.values[k : k + 1, i])
+            for i, (curve, dot) in enumerate(zip(drawn, dots, strict=True)):
+                curve.set_data(t[: k + 1], motion.values[: k + 1, i])
+                dot.set_data(t[k : k + 1], motion.values[k : k + 1, i])
 
         return move
+
+    return FilmPanel(motions, draw, margins=(0.6, 0.25, 0.7, 0.1))
 
 
 def film(panel: FilmPanel, t: Array, dark: bool = False, title: str = "") -> bytes:
@@ -221,6 +205,10 @@ def film(panel: FilmPanel, t: Array, dark: bool = False, title: str = "") -> byt
             clock.set_text(f"t = {t[FRAME_ROWS * k]:.2f} s")
 
         return to_gif(figure, frame, (len(t) - 1) // FRAME_ROWS + 1, RATE)
+
+
+def _all(motions: Sequence[Motion], wanted: Array | None) -> Array:
+    return np.concatenate([motion.values for motion in motions] + ([] if wanted is None else [wanted]))
 
 
 def _line(axis: Axes, **looks: Any) -> Line2D:

@@ -9,8 +9,8 @@ import dynamics as dyn
 from cgraph import _shared
 
 from . import library
-from .arguments import FORMULATIONS, answer, formulation, place, positive, say, started, takes_a_scene, takes_a_start
-from .command import Command
+from .arguments import FORMULATIONS, answer, formulation, place, positive, started, takes_a_scene, takes_a_start
+from .command import Command, say
 
 DRIVEN = ("by_definition", "chain_rule")
 WORDS = {"by_definition": "by definition", "chain_rule": "by the chain rule"}  # others by their names
@@ -37,7 +37,6 @@ def add(parser: Command) -> None:
         "--speed", type=positive, default=1.0, metavar="X", help="seconds of the motion in one of the film"
     )
     parser.add_argument("--dark", action="store_true", help="on a dark page")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sys
 import webbrowser
 from collections.abc import Mapping
 from contextlib import suppress
@@ -17,7 +16,7 @@ import dynamics as dyn
 from cgraph import _shared
 
 from . import library
-from .command import Command
+from .command import Command, say
 
 FORMULATIONS = (
     "by_definition",
@@ -74,12 +73,6 @@ def reading(options: argparse.Namespace) -> dict[str, Any]:
 def scene_of(options: argparse.Namespace) -> dyn.scenes.Scene:
     """The scene that the arguments name; what of a file is left out is a warning, a line of standard error."""
     return dyn.scenes.load(options.scene, **reading(options))
-
-
-def say(line: str) -> None:
-    """A line of progress or of warning, on standard error."""
-    if sys.stderr is not None:
-        print(f"cgraph: {line}", file=sys.stderr, flush=True)
 
 
 def unless_json(options: argparse.Namespace, data: object, text: object) -> str:
@@ -147,22 +140,18 @@ def verdict_of(options: argparse.Namespace, scene: dyn.scenes.Scene) -> dyn.Verd
     return None if other else dyn.formulation_verdict(scene, options.formulation)
 
 
-def equations_of(
-    options: argparse.Namespace, scene: dyn.scenes.Scene, verdict: dyn.Verdict | None = None
-) -> tuple[cg.Graph, str]:
-    """The graph that the arguments choose, and what it is: "inverse dynamics, chain rule".
+def equations_of(options: argparse.Namespace, scene: dyn.scenes.Scene) -> tuple[cg.Graph, str, dyn.Verdict | None]:
+    """The graph that the arguments choose, what it is, "inverse dynamics, chain rule", and the verdict of `verdict_of`.
 
-    verdict: that of `verdict_of`, if it is there, which has the graph.  Of an OdeSystem it is the state equation.
-    Raises for momenta of what has none.
+    Of an OdeSystem it is the state equation. Raises for momenta of what has none.
     """
+    if (verdict := verdict_of(options, scene)) is not None:
+        return verdict.graph, f"inverse dynamics, {options.formulation.replace('_', ' ')}", verdict
     if options.momentum:
-        return dyn.hamilton_equations(scene), "Hamilton's equations"
+        return dyn.hamilton_equations(scene), "Hamilton's equations", None
     if scene.ode is not None:
-        return dyn.state_equation(scene), "state equation"
-    if options.forward:
-        return dyn.forward_dynamics(scene), "forward dynamics"
-    graph = verdict.graph if verdict else dyn.inverse_dynamics(scene, options.formulation)
-    return graph, f"inverse dynamics, {options.formulation.replace('_', ' ')}"
+        return dyn.state_equation(scene), "state equation", None
+    return dyn.forward_dynamics(scene), "forward dynamics", None
 
 
 def place(text: str) -> Path:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import dynamics as dyn
 
 from . import library
-from .arguments import answer, counting, say, scene_of, takes_a_scene, unless_json, whole
-from .command import Command
+from .arguments import answer, counting, scene_of, takes_a_scene, unless_json, whole
+from .command import Command, say
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -21,7 +21,6 @@ def add(parser: Command) -> None:
     parser.add_argument("--states", type=counting, default=20, metavar="N", help="random states (default: 20)")
     parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random states (default: 0)")
     parser.add_argument("--json", action="store_true", help="print as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -37,9 +37,7 @@ def add(parser: Command) -> None:
     for name, about in (languages | {"python": "a Python function of a list"}).items():
         language.add_argument(f"--{name}", dest="language", action="store_const", const=name, help=about)
     parser.add_argument(
-        "--what",
-        choices=tuple(EQUATIONS),
-        help="default: forward_dynamics; of a first-order system state_equation",
+        "--what", choices=tuple(EQUATIONS), help="default: forward_dynamics; of a first-order system state_equation"
     )
     parser.add_argument(
         "--out", type=place, help="file to write, in place of standard output: .c (and .h), .mjs or .py"
@@ -55,7 +53,6 @@ def add(parser: Command) -> None:
         metavar="A=LOW:HIGH,...",
         help="inputs for which the bound of --float32 is stated, -1:1 if left out, parameters at their values",
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -80,7 +77,11 @@ def run(options: argparse.Namespace) -> None:
     elif options.language == "python":
         files = {suffix: python_text(graph)}
     else:
-        single = _single(options, scene, graph)
+        single: dict[str, Any] = {}
+        if options.float32:  # parameters have their values unless the box has another range
+            values = {name: value for name, value in scene.parameters.items() if name in graph.input_names}
+            ranges = library.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
+            single = {"dtype": "float32", "box": values | ranges}
         try:
             text = cg.to_c(graph, name, methods, names=dyn.display_names(scene), **single)
         except ValueError as error:
@@ -93,15 +94,6 @@ def run(options: argparse.Namespace) -> None:
     written = {out.with_suffix(end): content for end, content in files.items()}
     sizes = ", ".join(f"{path}: {len(content)} bytes" for path, content in written.items())
     answer(sizes, written)
-
-
-def _single(options: argparse.Namespace, scene: dyn.scenes.Scene, graph: cg.Graph) -> dict[str, Any]:
-    """Options of C in float; parameters have their values unless the box has another range."""
-    if not options.float32:
-        return {}
-    values = {name: value for name, value in scene.parameters.items() if name in graph.input_names}
-    ranges = library.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
-    return {"dtype": "float32", "box": values | ranges}
 
 
 def python_text(graph: cg.Graph) -> str:

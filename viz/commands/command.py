@@ -10,8 +10,14 @@ from typing import Any
 from cgraph import __version__
 
 
+def say(line: str) -> None:
+    """A line of progress, of warning or of an error, on standard error."""
+    if sys.stderr is not None:
+        print(f"cgraph: {line}", file=sys.stderr, flush=True)
+
+
 class Command(argparse.ArgumentParser):
-    """A command's parser. Its arguments are given by `add` of the command's file, which is loaded when they are needed.
+    """A command's parser. Its file, loaded when it is needed, has `add`, which gives arguments, and `run`.
 
     names: what `{scenes}` in a help stands for, asked for when the help is shown: the library takes a second to load,
     and a wrong argument is told before.
@@ -28,7 +34,9 @@ class Command(argparse.ArgumentParser):
     def load(self) -> None:
         """Add the command's arguments."""
         if self.file:
-            import_module(f".{self.file}", __package__).add(self)
+            module = import_module(f".{self.file}", __package__)
+            self.set_defaults(run=module.run)
+            module.add(self)
             self.file = ""
 
     def complete(self) -> None:

@@ -48,7 +48,6 @@ def add(parser: Command) -> None:
         "--sizes", action="store_true", help="sizes of p and dp/dt and of tau by the paper's three formulations alone"
     )
     may_draw_and_print(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -14,7 +14,6 @@ SHELLS = ("bash", "zsh", "fish")
 def add(parser: Command) -> None:
     """The command's arguments."""
     parser.add_argument("shell", choices=SHELLS, help='bash or zsh: eval "$(cgraph completion bash)"; fish: | source')
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -10,7 +10,7 @@ import dynamics as dyn
 from cgraph import _shared
 
 from . import library
-from .arguments import answer, collapsed, equations_of, place, scene_of, takes_a_scene, takes_equations, verdict_of
+from .arguments import answer, collapsed, equations_of, place, scene_of, takes_a_scene, takes_equations
 from .command import Command
 
 PICTURES = (".svg", ".png")
@@ -33,7 +33,6 @@ def add(parser: Command) -> None:
         metavar="A,B",
         help="draw all nodes of a tag as one box (default: of all tags if a picture needs it); '' for none",
     )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -49,8 +48,7 @@ def run(options: argparse.Namespace) -> None:
     scene = scene_of(options)
     if options.inertial_term and (options.forward or options.momentum or scene.ode is not None):
         raise ValueError("--inertial-term is of a Lagrangian, by a --formulation")
-    verdict = verdict_of(options, scene)
-    graph, what = equations_of(options, scene, verdict)
+    graph, what, verdict = equations_of(options, scene)
     if options.inertial_term:
         graph, wrong = library.blamed(scene, library.INERTIAL_TERM, options.formulation)
         off = {name.replace("tau", "p") + "_dot": each for name, each in verdict.excess.items()} if verdict else {}

@@ -24,7 +24,7 @@ def add(parser: Command) -> None:
         "--digits", type=counting, default=DIGITS, metavar="N", help=f"of numbers (default: {DIGITS}; 17 are all)"
     )
     parser.add_argument("--latex", action="store_true", help="print as LaTeX")
-    parser.set_defaults(run=run, forward=False)
+    parser.set_defaults(forward=False)
 
 
 def run(options: argparse.Namespace) -> int:

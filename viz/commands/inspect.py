@@ -9,14 +9,13 @@ from .arguments import (
     MOMENTUM_FORM,
     answer_page,
     positive,
-    say,
     started,
     takes_a_scene,
     takes_a_start,
     unless_json,
     writes_a_page,
 )
-from .command import Command
+from .command import Command, say
 
 LONGEST_MOTION = 1000.0  # s: seconds of work for an arm of ten links
 
@@ -31,7 +30,6 @@ def add(parser: Command) -> None:
     takes_a_start(parser)
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long it moves, in place of the scene's time")
     parser.add_argument("--json", action="store_true", help="print the sizes as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -7,8 +7,8 @@ from pathlib import Path
 from cgraph import _shared
 
 from . import library
-from .arguments import answer, may_open, say, scene_of, takes_a_scene
-from .command import Command
+from .arguments import answer, may_open, scene_of, takes_a_scene
+from .command import Command, say
 
 DEFAULT = "two_link"
 

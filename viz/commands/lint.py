@@ -21,7 +21,6 @@ from .arguments import (
     takes_a_scene,
     takes_equations,
     unless_json,
-    verdict_of,
 )
 from .command import Command
 from .compare import size_data, size_table
@@ -42,15 +41,13 @@ def add(parser: Command) -> None:
         "--at", type=point, metavar="A=1,B=2", help=f"look for sums that lose digits at this point; {REST}"
     )
     may_draw_and_print(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the proof or the blame; 1 where anything is not as declared."""
     check_picture(options)
     scene = scene_of(options)
-    verdict = verdict_of(options, scene)
-    graph, what = equations_of(options, scene, verdict)
+    graph, what, verdict = equations_of(options, scene)
     at = None if options.at is None else filled(graph, scene, options.at)
     if verdict is not None and verdict.differs and options.at:
         given = at or {}

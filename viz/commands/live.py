@@ -3,8 +3,8 @@
 import argparse
 
 from . import library
-from .arguments import answer_page, say, started, takes_a_scene, takes_a_start, writes_a_page
-from .command import Command
+from .arguments import answer_page, started, takes_a_scene, takes_a_start, writes_a_page
+from .command import Command, say
 
 
 def add(parser: Command) -> None:
@@ -12,7 +12,6 @@ def add(parser: Command) -> None:
     takes_a_scene(parser)
     takes_a_start(parser)
     writes_a_page(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

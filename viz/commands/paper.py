@@ -7,8 +7,8 @@ from pathlib import Path
 import dynamics as dyn
 
 from . import library
-from .arguments import answer, may_open, place, say
-from .command import Command
+from .arguments import answer, may_open, place
+from .command import Command, say
 
 
 def add(parser: Command) -> None:
@@ -17,7 +17,6 @@ def add(parser: Command) -> None:
     parser.add_argument("--quick", action="store_true", help="times of fewer evaluations, and shorter chains")
     may_open(parser)
     parser.add_argument("--json", action="store_true", help="print the figures as JSON on standard output")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -25,11 +25,10 @@ from .arguments import (
     positive,
     reading,
     reads_files,
-    say,
     start,
     unless_json,
 )
-from .command import Command
+from .command import Command, say
 
 CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
 
@@ -54,10 +53,7 @@ def add(parser: Command) -> None:
         "effects": lambda: dyn.EFFECTS,
     }
     parser.add_argument(
-        "scenes",
-        nargs="*",
-        metavar="SCENE",
-        help=f"{{scenes}}, a model file, MJCF or URDF, a case, or {IN_PYTHON}",
+        "scenes", nargs="*", metavar="SCENE", help=f"{{scenes}}, a model file, MJCF or URDF, a case, or {IN_PYTHON}"
     )
     parser.add_argument(
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
@@ -76,7 +72,7 @@ def add(parser: Command) -> None:
     parser.add_argument(
         "--lock", type=_locked, action="append", metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
     )
-    parser.set_defaults(run=run, words="scenes")
+    parser.set_defaults(words="scenes")
 
 
 def run(options: argparse.Namespace) -> int | None:
@@ -95,14 +91,12 @@ def run(options: argparse.Namespace) -> int | None:
     for name, with_these in GO_WITH.items():
         if kind not in with_these and getattr(options, name) not in (None, False):
             raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(with_these)}, not with {kind}")
-    runs: dict[str, Callable[[argparse.Namespace], int | None]] = {
-        CURVES: _curves,
-        STABILITY: _stability,
-        PRUNING: _pruning,
-    }
     if options.out is not None:
         library.check_folder(options.out)
-    return runs[kind](options)
+    if kind == STABILITY:
+        return _stability(options)
+    (_curves if kind == CURVES else _pruning)(options)
+    return None
 
 
 def _locked(text: str) -> tuple[str, float]:
@@ -136,37 +130,26 @@ def _curves(options: argparse.Namespace) -> None:
     chosen = {"t_end": options.t_end, "start": options.start, "reading": reading(options)}
     if options.out is not None:
         library.check_can_plot()
-    with _exact_motions(options.out) as (folder, new):
-        found, lines, files = _measured(options, chosen, folder)
-        answer(unless_json(options, found, "\n".join(lines)), files | new(), folder=options.out)
-
-
-def _measured(
-    options: argparse.Namespace, chosen: dict[str, Any], exact: Path
-) -> tuple[list[dict[str, Any]], list[str], dict[Path, str | bytes]]:
-    """Data, lines to print and files of a report."""
     found, lines, files = [], [], dict[Path, str | bytes]()
-    for name in options.scenes:
-        report = library.work_precision.work_precision(
-            name,
-            methods=options.methods or tuple(dyn.METHODS),
-            turns=3 if options.quick else 9,
-            limit=0.03 if options.quick else library.work_precision.LIMIT,
-            folder=exact,
-            options=chosen,
-            say=say,
-        )
-        content = report.to_dict()
-        found.append(content)
-        if options.out is not None:
-            document, rows = library.work_precision_page.work_precision(content), library.to_csv(report)
-            files |= (written := library.document_files(options.out, content["name"], document, content, rows))
-            points = sum(len(each.points) for each in report.curves)
-            lines.append(f"{[*written][-1]}: {len(report.curves)} integrators, {points} points")
-    return found, lines, files
-
-
-NAME = "stability"  # of the files
+    with _exact_motions(options.out) as (folder, new):
+        for name in options.scenes:
+            report = library.work_precision.work_precision(
+                name,
+                methods=options.methods or tuple(dyn.METHODS),
+                turns=3 if options.quick else 9,
+                limit=0.03 if options.quick else library.work_precision.LIMIT,
+                folder=folder,
+                options=chosen,
+                say=say,
+            )
+            content = report.to_dict()
+            found.append(content)
+            if options.out is not None:
+                document, rows = library.work_precision_page.work_precision(content), library.to_csv(report)
+                files |= (written := library.document_files(options.out, content["name"], document, content, rows))
+                points = sum(len(each.points) for each in report.curves)
+                lines.append(f"{[*written][-1]}: {len(report.curves)} integrators, {points} points")
+        answer(unless_json(options, found, "\n".join(lines)), files | new(), folder=options.out)
 
 
 def _stability(options: argparse.Namespace) -> int:
@@ -179,9 +162,8 @@ def _stability(options: argparse.Namespace) -> int:
     files: dict[Path, str | bytes] = {}
     text = library.stability.text(found)
     if options.out is not None:
-        files |= library.document_files(
-            options.out, NAME, library.stability_page.document(content), content, library.stability.to_csv(found)
-        )
+        document, rows = library.stability_page.document(content), library.stability.to_csv(found)
+        files |= library.document_files(options.out, "stability", document, content, rows)
         text = f"{text}\n{[*files][-1]}"
     answer(unless_json(options, content, text), files, folder=options.out)
     unexplained = [f"{each.case} by {each.method}" for each in found if not each.explained]
@@ -192,10 +174,9 @@ def _stability(options: argparse.Namespace) -> int:
 
 def _pruning(options: argparse.Namespace) -> None:
     """Write a page for each scene."""
-    without = options.without or ()
+    without, locked = options.without or (), options.lock or []
     if unknown := [each for each in without if each not in dyn.EFFECTS]:
         raise ValueError(f"effects are {', '.join(dyn.EFFECTS)}, got {unknown[0]!r}")
-    locked = options.lock or []
     lock = dict(locked)
     if len(lock) < len(locked):
         raise ValueError(f"--lock takes each body once, got {', '.join(body for body, _ in locked)}")
@@ -207,8 +188,9 @@ def _pruning(options: argparse.Namespace) -> None:
         found.append(content)
         if options.out is not None:
             document = library.pruning_page.document(content)
-            written = library.document_files(options.out, content["name"], document, content, kind="pruning")
-            files |= written
+            files |= (
+                written := library.document_files(options.out, content["name"], document, content, kind="pruning")
+            )
             sizes = [f"{each['equations']} {each['full']['nodes']} to {each['pruned']['nodes']} nodes"
                      for each in content["graphs"]]  # fmt: skip
             lines.append(f"{[*written][-1]}: {', '.join(sizes)}")
@@ -219,10 +201,11 @@ def pruning_content(
     scene: dyn.scenes.Scene, effects: Iterable[str], lock: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
     """Report of `prune` on a scene's inverse and forward dynamics, for JSON.  effects, lock: as of `prune`."""
-    kept, graphs = tuple(effects), []
-    for title, equations in (("inverse dynamics", dyn.inverse_dynamics), ("forward dynamics", dyn.forward_dynamics)):
-        pruned = dyn.prune(scene, equations, effects=kept, lock=lock)
-        graphs.append({"equations": title, **_account(pruned)})
+    kept = tuple(effects)
+    graphs = [
+        {"equations": title} | _account(dyn.prune(scene, equations, effects=kept, lock=lock))
+        for title, equations in (("inverse dynamics", dyn.inverse_dynamics), ("forward dynamics", dyn.forward_dynamics))
+    ]
     described = {"name": scene.name, "about": scene.about, "left_out": list(scene.left_out)}
     return {**described, "effects": list(kept), "graphs": graphs}
 

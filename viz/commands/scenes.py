@@ -13,7 +13,6 @@ from .command import Command
 def add(parser: Command) -> None:
     """The command's arguments."""
     parser.add_argument("--json", action="store_true", help="print as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

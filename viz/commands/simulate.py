@@ -33,7 +33,6 @@ def add(parser: Command) -> None:
     parser.add_argument("--every", type=positive, metavar="S", help="a row so often (default: every step is one)")
     parser.add_argument("--csv", type=place, metavar="FILE", help="write t, q, qd and energy, a line for each row")
     parser.add_argument("--json", action="store_true", help="print as JSON")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -11,7 +11,6 @@ def add(parser: Command) -> None:
     """The command's arguments."""
     writes_a_page(parser)
     parser.add_argument("--text", type=place, metavar="FILE", help="what the box holds at first, by default an example")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import cgraph as cg
 import dynamics as dyn
@@ -21,13 +21,12 @@ from .arguments import (
     takes_a_scene,
     takes_equations,
     unless_json,
-    verdict_of,
 )
 from .command import Command
 from .points import REST, SHOWN, filled, point_text
 
 if TYPE_CHECKING:
-    from ..models.causes import CauseTable
+    from ..models.causes import CauseInAll, Causes, CauseTable, Slopes
 
 KINDS = {"jump": "jumps, ", "kink": "kinks, the slope of ", "smooth": "no change near this state"}
 PATHS = 5  # that are listed and drawn where nothing else is said
@@ -56,7 +55,6 @@ def add(parser: Command) -> None:
     )
     parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"at which state; {REST}")
     may_draw_and_print(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int | None:
@@ -70,56 +68,46 @@ def run(options: argparse.Namespace) -> int | None:
         raise ValueError("--svg draws the paths from INPUT: name one, as in `why SCENE tau0 q1`")
     check_picture(options)
     scene = scene_of(options)
-    verdict = verdict_of(options, scene)
-    graph, _ = equations_of(options, scene, verdict)
+    graph, _, verdict = equations_of(options, scene)
     names = library.Names(graph, dyn.display_names(scene))
     at = filled(graph, scene, options.at)
-    state = (
-        f"At {point_text({names.shown(name): value for name, value in at.items()}, len(at) if options.at else SHOWN)}:"
-    )
     if options.nan:
         return _nan(options, scene, names, at)
     table = None if verdict is None else library.CauseTable(scene, graph, verdict.formulation, at)
     output = (table and table.named(options.output)) or names.meant(options.output)
+    state, alone = f"At {_state(options, names, at)}:", ""
+    asked: Causes | CauseInAll | Slopes
     if output in graph.outputs or output in names.by_name or table is None:
-        question = _Question(scene, names, verdict, table, output, at, state)
-        (_value if options.input is None else _dependence)(options, question)
-        return None
-    causes = table.in_all(options.output, options.input or "")
-    if options.svg:
-        raise ValueError(f"--svg draws paths between two nodes, and {causes.name!r} is a cause")
-    answer(unless_json(options, {"at": at} | causes.to_dict(), f"{state}\n{causes}"))
+        if options.input is not None:
+            _dependence(options, scene, names, verdict, table, output, at)
+            return None
+        if table is not None and output in graph.outputs:
+            asked, alone = table.of(output), library.tree_alone(scene)
+        else:
+            asked = library.Slopes(names, output, at)
+    else:
+        asked = in_all = table.in_all(options.output, options.input or "")
+        if options.svg:
+            raise ValueError(f"--svg draws paths between two nodes, and {in_all.name!r} is a cause")
+    answer(unless_json(options, {"at": at} | asked.to_dict(), f"{state}\n{asked}\n{alone}".rstrip()))
     return None
 
 
-class _Question(NamedTuple):
-    """What is asked of an output, and where: its scene, the names of its graph, and a state with its words."""
-
-    scene: dyn.scenes.Scene
-    names: library.Names
-    verdict: dyn.Verdict | None
-    table: CauseTable | None  # of torques
-    output: str
-    at: dict[str, float]
-    state: str
+def _state(options: argparse.Namespace, names: library.Names, at: dict[str, float]) -> str:
+    """The state in words: all of one that was asked for, else the first of its numbers."""
+    return point_text({names.shown(name): x for name, x in at.items()}, len(at) if options.at else SHOWN)
 
 
-def _value(options: argparse.Namespace, question: _Question) -> None:
-    """Causes of an output; of one that is no torque, its derivatives."""
-    scene, names, _, table, output, at, state = question
-    graph = names.graph
-    if table is not None and output in graph.outputs:
-        causes = table.of(output)
-        text, data = f"{causes}\n{library.tree_alone(scene)}".rstrip(), causes.to_dict()
-    else:
-        slopes = library.Slopes(names, output, at)
-        text, data = str(slopes), slopes.to_dict()
-    answer(unless_json(options, {"at": at} | data, f"{state}\n{text}"))
-
-
-def _dependence(options: argparse.Namespace, question: _Question) -> None:
+def _dependence(
+    options: argparse.Namespace,
+    scene: dyn.scenes.Scene,
+    names: library.Names,
+    verdict: dyn.Verdict | None,
+    table: CauseTable | None,
+    output: str,
+    at: dict[str, float],
+) -> None:
     """Causes of a derivative, then the heaviest paths, in the listing's numbers, with a picture of these alone."""
-    scene, names, verdict, table, output, at, state = question
     graph = names.graph
     found = cg.why(graph, output, options.input, at=at, k=options.k, names=dyn.display_names(scene))
     if not found.count:
@@ -129,12 +117,13 @@ def _dependence(options: argparse.Namespace, question: _Question) -> None:
     causes = table.of(output, options.input) if table is not None and output in graph.outputs else None
     all_listed = len(found.paths) == found.count
     total = sum([path.value or 0.0 for path in found.paths]) if all_listed else found.derivative
-    derivative = _by_reverse_sweep(names, output, options.input, at)
+    (bar,) = library.cotangents({names.output(output): cg.constant(1.0)}, [names.one(options.input)])
+    derivative = float(cg.Graph(graph.inputs, {"bar": bar}).evaluate(at)["bar"])
     gap = abs(total - derivative)
     balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
     what = "sum of path products" if all_listed else f"sum over all {found.count} path products"
     alone = "" if table is None else library.tree_alone(scene)
-    text = [state, *([str(causes)] if causes else []), str(found)]
+    text = [f"At {_state(options, names, at)}:", *([str(causes)] if causes else []), str(found)]
     text += [f"|{what} - derivative by a reverse sweep| = {gap:.2g}", *([alone] if alone else [])]
     data = {"depends": True, "of_the_tree": bool(alone), "at": at} | found.to_dict() | balance
     data |= {"causes": causes.to_dict()} if causes else {}
@@ -169,7 +158,7 @@ def _switches(options: argparse.Namespace) -> None:
     rate = dyn.hamilton_equations(scene) if options.momentum else dyn.state_equation(scene)
     names, at = library.Names(rate, dyn.display_names(scene)), filled(rate, scene, options.at)
     found = library.surfaces(scene, at, "momentum" if options.momentum else "velocity")
-    lines = [f"Near {point_text({names.shown(name): x for name, x in at.items()}, len(at) if options.at else SHOWN)}:"]
+    lines = [f"Near {_state(options, names, at)}:"]
     for each in found:
         by = ", ".join([f"{names.shown(name)} by {value:.6g}" for name, value in each.by.items()])
         tags = f"  [{', '.join(each.tags)}]" if each.tags else ""
@@ -184,17 +173,19 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
     graph = names.graph
     stops = cg.why_not(graph, output, options.input, names=dyn.display_names(scene))
     alone = "" if options.forward else library.tree_alone(scene)
-    constant = _constant(scene, names, options, output) if options.momentum else ""
+    source, conserved = names.meant(options.input), dyn.conserved_momenta(scene) if options.momentum else ()
+    told = [  # of a momentum whose rate was asked for, or whose coordinate the rate was asked by
+        library.constant_momentum(name)
+        for i, name in enumerate(scene.velocities)
+        if output == f"p{i}_dot" or (source == f"q{i}" and scene.coordinates[i] == name)
+        if name in conserved
+    ]
+    data = {"depends": False, "of_the_tree": bool(alone)} | stops.to_dict()
+    data |= {"constant": "\n".join(told)} if told else {}
     here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
     answer_and_draw(
         options,
-        unless_json(
-            options,
-            {"depends": False, "of_the_tree": bool(alone)}
-            | stops.to_dict()
-            | ({"constant": constant} if constant else {}),
-            "\n".join(filter(None, [str(stops), alone, constant])),
-        ),
+        unless_json(options, data, "\n".join(filter(None, [str(stops), alone, *told]))),
         graph,
         scene,
         marked={
@@ -203,21 +194,3 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
         },
         caption=f"{stops.output} does not depend on {stops.input}",
     )
-
-
-def _constant(scene: dyn.scenes.Scene, names: library.Names, options: argparse.Namespace, output: str) -> str:
-    """Sentence on a constant momentum whose rate was asked for, or whose coordinate the rate was asked by; or ""."""
-    source = names.meant(options.input)
-    told = [
-        library.constant_momentum(name)
-        for i, name in enumerate(scene.velocities)
-        if output == f"p{i}_dot" or (source == f"q{i}" and scene.coordinates[i] == name)
-        if name in dyn.conserved_momenta(scene)
-    ]
-    return "\n".join(told)
-
-
-def _by_reverse_sweep(names: library.Names, output: str, source: str, at: dict[str, float]) -> float:
-    """d output / d source by the library's reverse mode, which knows no paths."""
-    (bar,) = library.cotangents({names.output(output): cg.constant(1.0)}, [names.one(source)])
-    return float(cg.Graph(names.graph.inputs, {"bar": bar}).evaluate(at)["bar"])

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cgraph as cg
 from cgraph import Graph, GraphError
@@ -39,13 +40,17 @@ class Causes:
         """The sum of the parts."""
         return sum(self.parts.values())
 
+    @cached_property
+    def least(self) -> float:
+        """What a part is told as 0 up to."""
+        return ROUNDING * math.fsum(map(abs, self.parts.values()))
+
     def grouped(self) -> list[tuple[str, float, list[tuple[str, float]]]]:
         """(cause, its part, [(body, its part)]), the largest first, without what is 0."""
-        least = ROUNDING * math.fsum(map(abs, self.parts.values()))
         groups: dict[str, dict[str, float]] = {}
         for name, part in self.parts.items():
             cause = _cause(name)
-            if abs(part) > least:
+            if abs(part) > self.least:
                 groups.setdefault(cause, {})[name.removeprefix(cause).strip()] = part
         found = [
             (cause, sum(bodies.values()), sorted(bodies.items(), key=lambda each: -abs(each[1])))
@@ -70,20 +75,15 @@ class Causes:
         unit = f" {self.unit}" if self.unit else ""
         head = f"{self.what} = {self.value:.6g}{unit}, the sum of"
         rows, balance = self.rows(), f"= {self.what}; difference {abs(self.sum - self.value):.1g}"
-        lines = _listed(
-            [*rows, ("sum", self.sum)], {len(rows): balance}, max([abs(part) for _, part in rows], default=0.0)
-        )
-        return "\n".join([head, *lines, *self._zeros(), *self._blame()])
-
-    def _zeros(self) -> list[str]:
-        least = ROUNDING * math.fsum(map(abs, self.parts.values()))
-        zeros = [name for name, part in self.parts.items() if abs(part) <= least]
+        lines = [head, *_listed([*rows, ("sum", self.sum)], {len(rows): balance})]
+        zeros = [name for name, part in self.parts.items() if abs(part) <= self.least]
         more = [f"{len(zeros) - ZEROS} more"] if len(zeros) > ZEROS else []
-        return [f"  0 here: {', '.join([*zeros[:ZEROS], *more])}."] if zeros else []
+        lines += [f"  0 here: {', '.join([*zeros[:ZEROS], *more])}."] if zeros else []
+        return "\n".join([*lines, *self._blame()])
 
     def _blame(self) -> list[str]:
         wrong = math.fsum([part for name, part in self.parts.items() if name.startswith(SPURIOUS)])
-        if abs(wrong) <= ROUNDING * math.fsum(map(abs, self.parts.values())):
+        if abs(wrong) <= self.least:
             return []
         right = self.value - wrong
         right = right if abs(right) > ROUNDING * (abs(self.value) + abs(wrong)) else 0.0
@@ -112,21 +112,21 @@ class CauseInAll:
             rows.append((each.what, each.sum))
             alone = len({_cause(name) for name in each.parts}) == 1  # which the head names
             rows += each.rows()[1:] if alone else [(f"  {name}", part) for name, part in each.rows()]
-        longest = max([abs(part) for _, part in rows])
-        return "\n".join([f"{self.name}, in each of", *_listed(rows, ends, longest)])
+        return "\n".join([f"{self.name}, in each of", *_listed(rows, ends)])
 
     def to_dict(self) -> dict[str, Json]:
         """Dictionary for JSON."""
         return {"name": self.name, "causes": [each.to_dict() for each in self.causes]}
 
 
-def _listed(rows: Sequence[tuple[str, float]], ends: Mapping[int, str], longest: float) -> list[str]:
+def _listed(rows: Sequence[tuple[str, float]], ends: Mapping[int, str]) -> list[str]:
     """A line for every (name, number), with a bar; or after the bar, of rows in `ends`, a text; of "sum" no bar."""
     width = max([len(name) for name, _ in rows], default=0)
+    longest = max([abs(part) for name, part in rows if name != "sum"], default=0.0)
     lines = []
     for i, (name, part) in enumerate(rows):
-        size = BAR * abs(part) / longest if longest and name != "sum" else 0.0
-        bar = ("+" if part > 0.0 else "-") * (round(size) or int(size != 0.0))
+        size = BAR * abs(part) / longest if longest else 0.0
+        bar = "" if name == "sum" else ("+" if part > 0.0 else "-") * (round(size) or int(part != 0.0))
         if i in ends and bar:
             bar = f"{bar:<{BAR}}"
         lines.append(f"  {name:<{width}}  {part:>+11.4g}  {'  '.join(filter(None, [bar, ends.get(i, '')]))}".rstrip())
@@ -165,10 +165,6 @@ class CauseTable:
         )
         return found or (self.rows("potential") if asked in POTENTIAL else [])
 
-    def causes(self) -> list[str]:
-        """What can be asked for beside torques: "gravity", "Coriolis", .."""
-        return list(dict.fromkeys(map(_cause, self.table.rows)))
-
     def of(self, output: str, by: str = "", rows: Sequence[str] = ()) -> Causes:
         """Causes of an output, or of its derivative by an input or a named node; some of the rows or all of them.
 
@@ -188,9 +184,8 @@ class CauseTable:
             what = f"d {what} / d {self.names.called(by)}"
             beside = self.units.get(str(source.name), "")
             unit = unit if beside == "1" else f"{unit} per {beside}" if unit and beside else ""
-        values = Graph(self.table.graph.inputs, {str(k): node for k, node in enumerate(chosen.values())}).evaluate(
-            self.at
-        )
+        outputs = {str(k): node for k, node in enumerate(chosen.values())}
+        values = Graph(self.table.graph.inputs, outputs).evaluate(self.at)
         value = float(Graph(self.graph.inputs, {"value": whole}).evaluate(self.at)["value"])
         parts = {name: float(values[str(k)]) for k, name in enumerate(chosen)}
         return Causes(what, unit, value, parts)
@@ -200,25 +195,20 @@ class CauseTable:
         rows = self.rows(text)
         if not rows:
             outputs = [self.names.shown(name) for name in self.graph.outputs]
-            known = list(dict.fromkeys([*self.causes(), *outputs, *self.table.rows]))
+            known = list(dict.fromkeys([*map(_cause, self.table.rows), *outputs, *self.table.rows]))
             raise GraphError(f"there is no torque and no cause {text!r:.80}; {or_nearest(text, known)}")
         found = [self.of(output, by, rows) for output in self.graph.outputs if output.startswith("tau")]
         least = ROUNDING * max([abs(part) for each in found for part in each.parts.values()], default=0.0)
         there = [each for each in found if any(abs(part) > least for part in each.parts.values())]
-        return CauseInAll(_words(rows), sorted(there, key=lambda each: -abs(each.sum)))
+        kinds = {_cause(name) for name in rows}
+        name = kinds.pop() if len(kinds) == 1 else f"what {rows[0].removeprefix(_cause(rows[0]))[4:]} does"
+        name = rows[0] if len(rows) == 1 else name
+        return CauseInAll(name, sorted(there, key=lambda each: -abs(each.sum)))
 
 
 def _cause(name: str) -> str:
     """`gravity` of "gravity of link 2"."""
     return re.split(" of | on ", name, maxsplit=1)[0]
-
-
-def _words(rows: Sequence[str]) -> str:
-    """What rows have in common: their cause, or the body, or the one row."""
-    if len(rows) == 1:
-        return rows[0]
-    causes = {_cause(name) for name in rows}
-    return causes.pop() if len(causes) == 1 else f"what {rows[0].removeprefix(_cause(rows[0]))[4:]} does"
 
 
 class Slopes:
@@ -233,7 +223,7 @@ class Slopes:
         self.slopes = dict(sorted([each for each in slopes.items() if each[1]], key=lambda each: -abs(each[1])))
 
     def __str__(self) -> str:
-        rows = _listed(list(self.slopes.items()), {}, max(map(abs, self.slopes.values()), default=0.0))
+        rows = _listed(list(self.slopes.items()), {})
         about = "Its derivatives by what it depends on:" if rows else "No input changes it here."
         return "\n".join([f"{self.what} = {self.value:.6g}. {about}", *rows])
 

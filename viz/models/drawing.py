@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cgraph import Graph, Node
 from cgraph._shared import check_writable, require_path, write_files
@@ -79,11 +78,9 @@ def draw(
     check_can_draw(png=target is not None and target.suffix == ".png")
     if isinstance(model, Graph):
         drawing = to_dot(model, collapse=tags_to_collapse(model))
+    elif isinstance(model, Node):
+        raise TypeError(f"draw takes a model or a graph, got {model!r:.60}: cg.Graph(inputs, {{name: node}}) has it")
     else:
-        if isinstance(model, Node):
-            raise TypeError(
-                f"draw takes a model or a graph, got {model!r:.60}: cg.Graph(inputs, {{name: node}}) has it"
-            )
         scene = scenes.of_model(model)
         verdict = None if scene.ode is not None else formulation_verdict(scene, formulation)
         graph = state_equation(scene) if verdict is None else verdict.graph
@@ -98,23 +95,12 @@ def draw(
     return svg
 
 
-def judged_drawing(
-    graph: Graph,
-    verdict: Verdict | None,
-    *,
-    names: Mapping[str, str],
-    collapse: Sequence[str],
-    caption: str,
-    legend: bool | Mapping[str, str] = True,
-) -> Digraph:
-    """The drawing of equations, with nodes, edges and outputs painted that their verdict, if they have one, blames."""
-    return to_dot(
-        graph,
-        marked=verdict.nodes if verdict else (),
-        marked_edges=verdict.edges if verdict else (),
-        wrong_outputs=tuple(verdict.excess) if verdict else (),
-        names=names,
-        collapse=collapse,
-        caption=caption,
-        legend=legend,
-    )
+def judged_drawing(graph: Graph, verdict: Verdict | None, **options: Any) -> Digraph:
+    """The drawing of equations, with nodes, edges and outputs painted that their verdict, if they have one, blames.
+
+    options: as of `to_dot`.
+    """
+    if verdict is None:
+        return to_dot(graph, **options)
+    wrong = tuple(verdict.excess)
+    return to_dot(graph, marked=verdict.nodes, marked_edges=verdict.edges, wrong_outputs=wrong, **options)

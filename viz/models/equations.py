@@ -24,7 +24,6 @@ MATRICES = 4  # velocities up to which M is shown as a matrix
 MOST_PARTS = 8  # partial Lagrangians whose sum is shown
 LETTERS = {"M": "MHA", "c": "cbC", "g": "gnG", "d": "dD", "Q": "QFu"}  # the first that is no parameter is taken
 WORDS = {"M": "inertia", "c": "velocities", "g": "weight and springs", "d": "damping", "Q": "applied forces"}
-MASS = "M"
 PARTS = ("c", "g", "d", "Q")  # of the torque, beside M qdd
 # Formulations with Euler's step: what is differentiated through it, and how the torque is said to be had.
 EMBEDDED = {"by_definition": ("L", "by definition"), "kinetic_only": ("K", "by the kinetic energy alone")}
@@ -101,9 +100,8 @@ def _short_names(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
     if stem is None or is_letter(stem) or len(called) == 1:
         return names, {}
     index = {name: match.group(2) for name, match in matches.items() if match}
-    short = {
-        key: f"{kind}.{index.get(name, name)}" for key, text in names.items() for kind, _, name in [text.partition(".")]
-    }
+    split = {key: text.partition(".") for key, text in names.items()}
+    short = {key: f"{kind}.{index.get(name, name)}" for key, (kind, _, name) in split.items()}
     return short, {number: name for name, number in index.items()}
 
 
@@ -151,36 +149,31 @@ def _torque(scene: Scene, formulation: str) -> list[Block]:
     blocks = [Block(title, explicit)] if short else []
     if 2 <= system.n <= MATRICES:
         blocks.append(_by_matrices(system))
-    return blocks or [Block(title, [_in_general(system, _parts(system)), *explicit], _about(system, _parts(system)))]
+    if blocks:
+        return blocks
+    damped = any(node.value != 0.0 for node in damping_force(system).outputs.values())
+    driven = any(node.value != 0.0 for node in system.forces)
+    return [_in_general(title, _letters(system), ["c", "g", *["d"] * damped, *["Q"] * driven], explicit)]
 
 
-def _letters(system: System) -> dict[str, str]:
+def _letters(system: System) -> dict[str, Node]:
     """{part of the torque: its letter}, none that is a parameter."""
     taken = {str(node.name) for node in system.extra_inputs}
     return {
-        name: next(each for each in (*some, f"{name}_{name}") if each not in taken) for name, some in LETTERS.items()
+        name: variable(next(each for each in (*some, f"{name}_{name}") if each not in taken))
+        for name, some in LETTERS.items()
     }
 
 
-def _parts(system: System) -> list[str]:
-    """The parts of the torque beside that of inertia, as far as there are damping and forces."""
-    damped = any(node.value != 0.0 for node in damping_force(system).outputs.values())
-    driven = any(node.value != 0.0 for node in system.forces)
-    return ["c", "g", *["d"] * damped, *["Q"] * driven]
-
-
-def _in_general(system: System, parts: Sequence[str]) -> tuple[Node, Node]:
-    """tau = M qdd + c + g + d - Q, of the parts that there are."""
-    letters = {name: variable(letter) for name, letter in _letters(system).items()}
+def _in_general(
+    title: str, letters: Mapping[str, Node], parts: Sequence[str], held: Sequence[tuple[Side, ...]], more: str = ""
+) -> Block:
+    """tau = M qdd + c + g + d - Q, of the parts that there are, then what is held.  more: on M."""
     total = letters["M"] * variable("qdd")
     for name in parts:
         total = total - letters[name] if name == "Q" else total + letters[name]
-    return variable("tau"), total
-
-
-def _about(system: System, parts: Sequence[str], more: str = "") -> str:
-    letters = _letters(system)
-    return f"{'; '.join([f'{letters[name]}: {WORDS[name]}{more * (name == MASS)}' for name in (MASS, *parts)])}."
+    about = "; ".join([f"{letters[name].name}: {WORDS[name]}{more * (name == 'M')}" for name in ("M", *parts)])
+    return Block(title, [(variable("tau"), total), *held], f"{about}.")
 
 
 def _by_matrices(system: System) -> Block:
@@ -199,14 +192,13 @@ def _by_matrices(system: System) -> Block:
     rows = [entries[i * n : (i + 1) * n] for i in range(n + len(PARTS))]
     matrix, columns = rows[:n], zip(PARTS, rows[n:], strict=True)
     kept = {name: column for name, column in columns if any(each.value != 0.0 for each in column)}
-    letters = {name: variable(letter) for name, letter in _letters(system).items()}
+    letters = _letters(system)
     wide = max([sum([ink(entry) for entry in row]) for row in matrix]) > EXPLICIT / 2
     held: list[tuple[Side, ...]] = [(letters["M"], matrix)]
     if wide:  # the lower triangle entry by entry
         held = [(variable(f"M_{i}_{j}"), matrix[i][j]) for i in range(n) for j in range(i + 1)]
     held += [(letters[name], [[entry] for entry in column]) for name, column in kept.items()]
-    about = _about(system, list(kept), ", symmetric" * wide)
-    return Block("Torque by matrices", [_in_general(system, list(kept)), *held], about)
+    return _in_general("Torque by matrices", letters, list(kept), held, ", symmetric" * wide)
 
 
 def _spurious(scene: Scene, formulation: str) -> list[Block]:

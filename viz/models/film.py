@@ -6,7 +6,6 @@ import base64
 import math
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,7 @@ from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.multibody.trees.mechanism import as_mechanism
 from dynamics.systems.model import Model
 
-from ..animation.panels import FRAME_ROWS, RATE, Curves, FilmPanel, Motion, Sticks, film
+from ..animation.panels import FRAME_ROWS, RATE, FilmPanel, Motion, curves, film, sticks
 from ..plots.plot import check_can_plot
 
 MOST_FRAMES, MOST_MOTIONS = 1000, 4
@@ -181,15 +180,16 @@ def _panel(
     rows = [_at(each, times) for each in known.values()]
     if wanted is not None:
         rows.append(_wanted(wanted, times, len(model.coordinates)))
-    mechanism = as_mechanism(model)
-    make: Callable[..., FilmPanel] = partial(Curves, names=list(model.coordinates), t=times)
-    shown = rows
-    if mechanism is not None:  # all at once, so that they are seen from one side
-        seen = skeleton(mechanism.bind(), np.concatenate(rows))
+    mechanism, shown = as_mechanism(model), rows  # all at once, so that they are seen from one side
+    seen = None if mechanism is None else skeleton(mechanism.bind(), np.concatenate(rows))
+    if seen is not None:
         points = seen.points if seen.surfaces is None else np.concatenate([seen.points, seen.surfaces], axis=1)
-        shown, make = np.split(points, len(rows)), partial(Sticks, parents=seen.parents, radii=seen.radii)
+        shown = np.split(points, len(rows))
     motions = [Motion(name, values, name in wrong) for name, values in zip(known, shown, strict=False)]
-    return make(motions, None if wanted is None else shown[-1])
+    ghost = None if wanted is None else shown[-1]
+    if seen is None:
+        return curves(motions, ghost, model.coordinates, times)
+    return sticks(motions, ghost, seen.parents, seen.radii)
 
 
 def _wanted(wanted: Callable[[Array], ArrayLike], times: Array, nq: int) -> Array:

@@ -113,7 +113,8 @@ def inspection(
         versions[name] = _version(scene, name)
     about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
     about += " With them come the forces that hold the constraints." if system.constraints else ""
-    versions[FORWARD] = Version(FORWARD, rate, about, steps=elimination(rate, display_names(scene)), group=FORWARD)
+    steps = elimination(rate, display_names(scene))
+    versions[FORWARD] = Version(FORWARD, rate, about, steps=steps, group=FORWARD)
     say(f"{scene.name}: deriving Hamilton's equations, and the state equation beside them")
     lacking = ""
     try:
@@ -123,18 +124,19 @@ def inspection(
     derived = _derived(system, momenta=not lacking)
     places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
-    graphs = [derived, *[each.graph for each in versions.values()], *([places.graph] if places is not None else [])]
-    inputs = {name for graph in graphs for name in graph.input_names}
+    graphs = [*[each.graph for each in versions.values()], derived, *([places.graph] if places is not None else [])]
+    inputs, by_cause = {name for graph in graphs for name in graph.input_names}, torque_by_cause(scene)
+    rows = {f"tau{i}": [f"tau{i}_{k}" for k in range(len(by_cause.rows))] for i in range(system.n)}
     return Inspection(
         versions,
         Motion(run.t) if places is None else Motion(run.t, *places),
-        at={name: value for name, value in state.items() if name in inputs},
-        derived=derived,
-        shares=_shares(scene),
-        carried=carried(scene),
+        {name: value for name, value in state.items() if name in inputs},
+        derived,
+        _shares(scene),
+        carried(scene),
         stopped="" if run.stats.success else run.stats.message,
         units=units | {"t": "s", "dt": "s"},
-        causes=_causes(scene),
+        causes=StateTable("Torques and forces by cause", by_cause.graph, by_cause.rows, rows),
         lacking=lacking,
     )
 
@@ -190,20 +192,19 @@ def _derived(system: System, *, momenta: bool) -> Graph:
     old = {f"q{i}_old": q - dt * rate for i, (q, rate) in enumerate(zip(system.q, system.q_dot, strict=True))}
     old |= {f"qd{i}_old": qd - dt * rate for i, (qd, rate) in enumerate(zip(system.qd, qdd, strict=True))}
     inputs = [*system.q, *system.qd, *qdd, dt]
-    if not momenta:
-        return Graph(inputs, old)
-    graph = momentum(system)
-    own = [node for node in graph.inputs if node not in inputs]
-    return Graph([*inputs, *own], old | graph.outputs)
+    if momenta:
+        graph = momentum(system)
+        inputs += [node for node in graph.inputs if node not in inputs]
+        old |= graph.outputs
+    return Graph(inputs, old)
 
 
 def _version(scene: Scene, name: str) -> Version:
     verdict = formulation_verdict(scene, name)
     about = f"{verdict.summary} {verdict.explanation}".strip()
     if not verdict.differs:
-        held = bool(scene.system.constraints)
-        driven = "these torques are those of the constraints alone" if held else "the torques should be 0"
-        about += f" Nothing drives the joints here: {driven}."
+        alone = "these torques are those of the constraints alone"
+        about += f" Nothing drives the joints here: {alone if scene.system.constraints else 'the torques should be 0'}."
     return Version(
         TITLES[name],
         verdict.graph,
@@ -231,13 +232,6 @@ def _shares(scene: Scene) -> StateTable | None:
     outputs = {part: table.graph.outputs[f"{tau}_{k}"] for tau, row in rows.items() for k, part in enumerate(row[:-1])}
     graph = Graph(whole.inputs, outputs | {row[-1]: whole.outputs[tau] for tau, row in rows.items()})
     return StateTable("Torques and forces that each part takes", graph, (*table.rows, "all"), rows)
-
-
-def _causes(scene: Scene) -> StateTable:
-    """Torques and forces by cause and body, by the chain rule."""
-    table = torque_by_cause(scene)
-    rows = {f"tau{i}": [f"tau{i}_{k}" for k in range(len(table.rows))] for i in range(scene.system.n)}
-    return StateTable("Torques and forces by cause", table.graph, table.rows, rows)
 
 
 def elimination(graph: Graph, names: Mapping[str, str]) -> list[Step]:

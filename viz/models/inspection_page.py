@@ -130,10 +130,6 @@ def inspection_page(
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         causes=content.causes,
         notices=[*notices, *([f"The motion is not whole: it {content.stopped}."] if content.stopped else [])],
-        panels=[
-            box(text_or_none(scene, scene.q, scene.qd)),
-            *motions,
-            formulas_panel(scene, momenta=view == MOMENTUM),
-        ],
+        panels=[box(text_or_none(scene, scene.q, scene.qd)), *motions, formulas_panel(scene, momenta=view == MOMENTUM)],
         view=next((each.name for each in versions if each.group == view), ""),
     )

@@ -135,9 +135,9 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
 
 
 def adjustable(scene: Scene) -> Scene:
-    """The scene that the page computes.
+    """The scene that the page computes: of a small mechanism without parameters, masses and gravity are some.
 
-    Of a small mechanism without parameters, masses, with inertias in proportion, and the size of gravity are some.
+    Inertias are in proportion to the masses.
     """
     mechanism = scene.mechanism
     if mechanism is None:
@@ -157,8 +157,8 @@ def adjustable(scene: Scene) -> Scene:
             body = replace(body, mass=mass, inertia=scaled if inertia.ndim == 2 else scaled[0])
         bodies.append(body)
     down = [float(part / size) * cg.variable("g") if part else 0.0 for part in gravity]
-    made = replace(mechanism, bodies=bodies, gravity=down if size else mechanism.gravity, parameters=parameters)
-    return replace(scene, model=made)
+    adjusted = replace(mechanism, bodies=bodies, gravity=down if size else mechanism.gravity, parameters=parameters)
+    return replace(scene, model=adjusted)
 
 
 def _limits(scene: Scene) -> dict[str, tuple[float, float]]:
@@ -177,11 +177,17 @@ def _first_order(scene: Scene) -> Live:
     values = dict(zip(scene.coordinates, scene.q, strict=True)) | dict(scene.parameters)
     start = {name: float(values.get(name, 0.0)) for name in rate.input_names}  # the time is 0
     sides, of_sides = _sides(scene)
-    meters, shown = (
-        [(f"d {name}/dt", "", "rate") for name in scene.coordinates],
+    meters = [*[(f"d {name}/dt", "", "rate") for name in scene.coordinates], *of_sides]
+    return Live(
+        rate,
+        start,
         Graph(rate.inputs, rate.outputs | sides),
+        meters,
+        dt=_step(scene),
+        methods=TABLEAUS,
+        units={"t": "s"},
+        notes=NOTES,
     )
-    return Live(rate, start, shown, meters + of_sides, dt=_step(scene), methods=TABLEAUS, units={"t": "s"}, notes=NOTES)
 
 
 def _sides(scene: Scene, form: str = "velocity") -> tuple[dict[str, Node], list[tuple[str, str, str]]]:

@@ -64,13 +64,10 @@ def labeled(
         for axis in axes.flat[len(panels) :]:
             axis.set_axis_off()
         for axis, panel in zip(axes.flat, panels, strict=False):
-            axis.set_xscale("log")
-            axis.set_yscale("log")
+            axis.set(xscale="log", yscale="log", xlabel=panel.x, ylabel=panel.y)
             for line in panel.lines:
                 _draw(axis, line)
             axis.set_title(panel.title, fontsize=10, loc="left")
-            axis.set_xlabel(panel.x)
-            axis.set_ylabel(panel.y)
             axis.tick_params(labelbottom=True, labelleft=True)
             axis.grid(**GRID)
         for axis in axes.flat[:1] if shared else axes.flat[: len(panels)]:

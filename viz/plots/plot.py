@@ -106,9 +106,7 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], dots: A
                 axis.plot(*passed.T, ".", color=theme.TEXT, markersize=2.5)
                 axis.plot(*dots[row].T, ".", color=theme.TEXT, markersize=5)
             axis.set_title(f"({letter})  t = {times[row]:.1f} s", fontsize=10, loc="left")
-            axis.set_aspect("equal")
-            axis.set_xlim(-reach, reach)
-            axis.set_ylim(low, high)
+            axis.set(aspect="equal", xlim=(-reach, reach), ylim=(low, high))
             axis.grid(**GRID)
         for axis in axes[-1]:
             axis.set_xlabel("x [m]")
@@ -127,9 +125,7 @@ def over_time(times: Array, values: Array, y: str, colors: Sequence[str]) -> Fig
         axis = figure.subplots()
         for joint, (column, color) in enumerate(zip(values.T, colors, strict=False), start=1):
             axis.plot(times, column, ".", color=color, markersize=2.0, label=f"joint {joint}")
-        axis.set_yscale("log")
-        axis.set_xlabel("t [s]")
-        axis.set_ylabel(y)
+        axis.set(yscale="log", xlabel="t [s]", ylabel=y)
         axis.grid(**GRID)
         axis.legend(frameon=False, markerscale=5.0, loc="lower right", ncols=values.shape[1])
     return figure
