@@ -231,17 +231,13 @@ def quantity(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> flo
     if isinstance(value, Node) and not names_in([value]):
         value = evaluated(value, {}).item()
     if isinstance(value, str | Node):
-        _check_names(what, value)
+        for name in names_in([value]):
+            checked_name(f"a parameter of {what}", name, spaces=False)
         return symbol(value)
     if is_finite(value) and float(value) >= minimum:
         return float(value)
     bound = " and at least 0" if minimum == 0.0 else ""
     raise MechanismError(f"{what} must be finite{bound}, got {value!r:.80}{unit}")
-
-
-def _check_names(what: str, value: str | Node) -> None:
-    for name in names_in([value]):
-        checked_name(f"a parameter of {what}", name, spaces=False)
 
 
 def _mass(what: str, value: object) -> float | Node:
