@@ -133,7 +133,8 @@ class StabilityCase(AccuracyTask):
 
     atol: absolute tolerance, for all states or for each; default a thousandth of RTOL in SI units.
     growth: the largest relative change by t_end for a small relative change of the start; None without a solution.
-    invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion.
+    invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion; by
+    default the energy, where there is a criterion of it.
     """
 
     digits: int = 20  # four more than float64 can tell
@@ -147,6 +148,8 @@ class StabilityCase(AccuracyTask):
         super().__post_init__()
         if self.growth is not None and not any([each.quantity.startswith("error") for each in self.criteria]):
             object.__setattr__(self, "criteria", (*self.criteria, error_criterion(self.growth)))
+        if self.invariants is None and any([each.quantity == "energy" for each in self.criteria]):
+            object.__setattr__(self, "invariants", conserved())
 
 
 def error_criterion(growth: float, why: str = GROWN) -> Criterion:

@@ -35,16 +35,12 @@ def spent(run: Callable[[], Made]) -> Spent[Made]:
     return Spent(seconds, time.process_time() - worked, made)
 
 
-def nothing() -> None:
-    """Do nothing."""
-
-
 @dataclass
 class Timed:
     """A run with what its turns took, by the clock and of the processor [s]; `rewind` goes back to its start."""
 
     run: Callable[[], Any]
-    rewind: Callable[[], object] = nothing
+    rewind: Callable[[], object] = lambda: None
     seconds: list[float] = field(default_factory=list)
     processor: list[float] = field(default_factory=list)
 
@@ -55,7 +51,7 @@ def in_turns(runs: Sequence[Timed], turns: int, chunk: float = 0.0, enough: floa
     chunk: seconds of a turn, which short runs fill by several.  enough: seconds of a run, after which three are enough.
     """
     gc.disable()
-    read = min([spent(nothing).processor for _ in range(CLOCKS)])  # what the reading of the clocks takes
+    read = min([spent(lambda: None).processor for _ in range(CLOCKS)])  # what the reading of the clocks takes
     try:
         for _ in range(turns):
             for each in runs:

@@ -52,21 +52,21 @@ def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False,
             add_floating_base(robot)
         links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
         root = _root(links, joints)
-        mimics = read_mimics(joints)
+        leaders, refused, of_no_effect = read_mimics(joints)
         with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
             inertials = {name: _inertial(link, name) for name, link in links.items()}
             bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **inertials[root].fields)]
             for name, element in joints.items():
                 parent, child = _end(element, name, "parent"), _end(element, name, "child")
                 bodies.append(Body(child, _joint(element, name, child), parent, **inertials[child].fields))
-        outside = [*_outside(robot, joints, smooth), *mimics.of_no_effect, *_negative(inertials, by_digits=True)]
-        left_out = refused_or_left_out([*mimics.refused, *_negative(inertials, by_digits=False)], outside, ignore)
+        outside = [*_outside(robot, joints, smooth), *of_no_effect, *_negative(inertials, by_digits=True)]
+        left_out = refused_or_left_out([*refused, *_negative(inertials, by_digits=False)], outside, ignore)
         mechanism = Mechanism(
             bodies,
             _gravity(robot),
             _forces(joints, smooth),
             left_out=left_out,
-            loops=_couplings(joints, mimics.leaders),
+            loops=_couplings(joints, leaders),
         )
         return mechanism if smooth.contacts is None else with_contacts(mechanism, smooth.contacts, *_balls(links))
     except MechanismError as error:
@@ -354,16 +354,11 @@ def _extensions(robot: Element) -> Iterator[str]:
 _SINGLE = ("continuous", "revolute", "prismatic")  # joints with one coordinate
 
 
-class Mimics(NamedTuple):
-    """Joints that mimic others, and sentences on those that do not go in."""
+def read_mimics(joints: Mapping[str, Element]) -> tuple[dict[str, str], list[str], list[str]]:
+    """{joint that mimics another: that one}, and sentences on those that are refused, and on those without effect.
 
-    leaders: dict[str, str]  # of each that follows, the joint that it mimics
-    refused: list[str]
-    of_no_effect: list[str]
-
-
-def read_mimics(joints: Mapping[str, Element]) -> Mimics:
-    """The joints that mimic others. Raises MechanismError for a joint that mimics several."""
+    Raises MechanismError for a joint that mimics several.
+    """
     leaders: dict[str, str] = {}
     for name, joint in joints.items():
         if len(mimics := joint.findall("mimic")) > 1:
@@ -382,7 +377,7 @@ def read_mimics(joints: Mapping[str, Element]) -> Mimics:
         "joints that mimic one another in a circle": circle,
         "joints that mimic others where one of both has not one coordinate": several,
     }
-    return Mimics(
+    return (
         {name: leaders[name] for name in others if name not in several},
         present({f"{what} ({_after(names, leaders)})": names for what, names in refused.items()}),
         present({f"fixed joints that mimic others ({_after(fixed, leaders)})": fixed}),

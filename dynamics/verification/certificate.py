@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -214,7 +214,7 @@ class _Checks:
         yield self._energy()
         yield self._sum("links: partial torques add up to tau", torque_by_link(self.system))
         yield self._adjoint()
-        yield from derivative_residuals(self.system, self.value, self.inverse, self.inertia, self.new_rows, self.rng)
+        yield from self._derivatives()
         graphs = {"L": self.graph({"L": self.system.lagrangian}), "tau": self.inverse}
         if self.held.any:
             yield self.held.closed(self.accelerations, self.inertia, np.abs(self.held_by).sum(axis=-1))
@@ -333,52 +333,46 @@ class _Checks:
         scale = np.abs(slope) + np.max([np.abs(each) for each in around.values()], axis=0)
         return Residual(equation, worst(unexplained, scale), DIFFERENCES)
 
+    def _derivatives(self) -> Iterator[Residual]:
+        """Residuals of the derivatives of torques, and of accelerations times M, how far these miss their equation.
 
-def derivative_residuals(
-    system: System,
-    value: Callable[[Graph], Array],
-    inverse: Graph,
-    inertia: Array,
-    new_rows: Array,
-    rng: np.random.Generator,
-) -> Iterator[Residual]:
-    """Residuals of the derivatives of torques, and of accelerations, these times M: how far their equation is missed.
+        Multipliers of rows of which a share s is new are rounded by 1 / s, and slopes that have them by 1 / s^2. Slopes
+        of accelerations are not determined where s is not clear.
+        """
+        system, inertia, new_rows = self.system, self.inertia, self.new_rows
+        n = system.n
+        line = self.rng.normal(size=4 * n)  # dxi, dqd, dqdd and dtau
+        xi, v, a, f = ([cg.constant(float(x)) for x in part] for part in np.split(line, 4))
+        seeds = dict(zip([*system.q, *system.qd], [*system.kinematics.rate(xi), *v], strict=True))
 
-    Multipliers of rows of which a share s is new are rounded by 1 / s, and slopes that have them by 1 / s^2.
+        def along(graph: Graph, more: dict[cg.Node, cg.Node]) -> Array:
+            """The first n outputs' slopes."""
+            outputs = list(graph.outputs.values())[:n]
+            dots = tangents(seeds | more, outputs)
+            slopes = {f"{i}": dots.get(node, ZERO) for i, node in enumerate(outputs)}
+            return self.value(system.graph(slopes, system.q, system.qd, list(more)))
 
-    value: numbers of a graph at the states, (N, n_out).  inverse: of inverse dynamics.  inertia: M, (N, n, n).
-    new_rows: s, (N,); slopes of accelerations are not determined where it is not clear.
-    """
-    n = system.n
-    line = rng.normal(size=4 * n)  # dxi, dqd, dqdd and dtau
-    xi, v, a, f = ([cg.constant(float(x)) for x in part] for part in np.split(line, 4))
-    seeds = dict(zip([*system.q, *system.qd], [*system.kinematics.rate(xi), *v], strict=True))
-
-    def along(graph: Graph, more: dict[cg.Node, cg.Node]) -> Array:
-        """The first n outputs' slopes."""
-        outputs = list(graph.outputs.values())[:n]
-        dots = tangents(seeds | more, outputs)
-        slopes = {f"{i}": dots.get(node, ZERO) for i, node in enumerate(outputs)}
-        return value(system.graph(slopes, system.q, system.qd, list(more)))
-
-    pushed = along(inverse, dict(zip(system.qdd, a, strict=True)))
-    entries = value(inverse_dynamics_derivatives(system))[:, n:].reshape(-1, 3, n, n)
-    terms = np.swapaxes(entries, 1, 2).reshape(-1, n, 3 * n) * line[: 3 * n]
-    equation = "derivatives: dtau/dq, dtau/dqd and M along a line = AD of inverse dynamics"
-    yield rounded(equation, terms.sum(axis=-1) - pushed, np.abs(terms).sum(axis=-1))
-    clear = new_rows >= CLEAR
-    if not clear.any():
-        return
-    slopes = np.abs(terms[..., : 2 * n]).sum(axis=-1) + np.abs(
-        line[3 * n :]
-    )  # of the forces, which constraints take up
-    pushed = along(forward_dynamics(system), dict(zip(system.tau, f, strict=True)))
-    matrices = value(state_space(system))
-    a_rows, b_rows = matrices[:, : 4 * n * n].reshape(-1, 2 * n, 2 * n), matrices[:, 4 * n * n :].reshape(-1, 2 * n, n)
-    terms = np.concatenate([a_rows, b_rows], axis=-1)[:, n:] * np.delete(line, np.s_[2 * n : 3 * n])
-    missed = (inertia @ (terms.sum(axis=-1) - pushed)[..., None])[..., 0]
-    sizes = (np.abs(inertia) @ np.abs(terms).sum(axis=-1)[..., None])[..., 0] + slopes
-    sizes = sizes[clear] / new_rows[clear, None] ** 2
-    yield rounded(
-        "derivatives: A and B of the linearization along a line = AD of forward dynamics", missed[clear], sizes
-    )
+        pushed = along(self.inverse, dict(zip(system.qdd, a, strict=True)))
+        entries = self.value(inverse_dynamics_derivatives(system))[:, n:].reshape(-1, 3, n, n)
+        terms = np.swapaxes(entries, 1, 2).reshape(-1, n, 3 * n) * line[: 3 * n]
+        equation = "derivatives: dtau/dq, dtau/dqd and M along a line = AD of inverse dynamics"
+        yield rounded(equation, terms.sum(axis=-1) - pushed, np.abs(terms).sum(axis=-1))
+        clear = new_rows >= CLEAR
+        if not clear.any():
+            return
+        slopes = np.abs(terms[..., : 2 * n]).sum(axis=-1) + np.abs(
+            line[3 * n :]
+        )  # of the forces, which constraints take up
+        pushed = along(forward_dynamics(system), dict(zip(system.tau, f, strict=True)))
+        matrices = self.value(state_space(system))
+        a_rows, b_rows = (
+            matrices[:, : 4 * n * n].reshape(-1, 2 * n, 2 * n),
+            matrices[:, 4 * n * n :].reshape(-1, 2 * n, n),
+        )
+        terms = np.concatenate([a_rows, b_rows], axis=-1)[:, n:] * np.delete(line, np.s_[2 * n : 3 * n])
+        missed = (inertia @ (terms.sum(axis=-1) - pushed)[..., None])[..., 0]
+        sizes = (np.abs(inertia) @ np.abs(terms).sum(axis=-1)[..., None])[..., 0] + slopes
+        sizes = sizes[clear] / new_rows[clear, None] ** 2
+        yield rounded(
+            "derivatives: A and B of the linearization along a line = AD of forward dynamics", missed[clear], sizes
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,21 +94,6 @@ def constrained_accelerations(mechanism: Mechanism, q: Array, qd: Array, tau: Ar
 
     Raises ImportError without Pinocchio, and UnavailableError for what it has not.
     """
-    ready, rows = constraint_dynamics(mechanism, _PROXIMAL), []
-    for x in np.concatenate([q, qd, tau], axis=1):
-        run, result = ready(x)
-        run()
-        rows.append(result())
-    return np.array(rows)
-
-
-def constraint_dynamics(
-    mechanism: Mechanism, proximal: tuple[float, float, int]
-) -> Callable[[Array], tuple[Callable[[], object], Callable[[], Array]]]:
-    """Call at x = (q, qd, tau), and a function that reads the accelerations, (n,), that it left.
-
-    proximal: what is left of the constraints, its regularization, and iterations. Raises as above.
-    """
     for loop in mechanism.loops:
         if loop.kind not in _KINDS:
             raise UnavailableError(f"has no loop of the kind {loop.kind!r}")
@@ -120,16 +105,12 @@ def constraint_dynamics(
         models.append(pin.RigidConstraintModel(getattr(pin.ContactType, _KINDS[loop.kind]), model, *ends, pin.LOCAL))
         datas.append(models[-1].createData())
     pin.initConstraintDynamics(model, data, models, datas)
-    settings, solve = pin.ProximalSettings(*proximal), pin.constraintDynamics
-
-    def ready(x: Array) -> tuple[Callable[[], object], Callable[[], Array]]:
+    settings, rows = pin.ProximalSettings(*_PROXIMAL), []
+    for x in np.concatenate([q, qd, tau], axis=1):
         theirs = peer.arguments(x, True)
-        return (
-            lambda: solve(model, data, *theirs, models, datas, settings),
-            lambda: peer.of.our_a(*theirs[:2], np.array(data.ddq)),
-        )
-
-    return ready
+        pin.constraintDynamics(model, data, *theirs, models, datas, settings)
+        rows.append(peer.of.our_a(*theirs[:2], np.array(data.ddq)))
+    return np.array(rows)
 
 
 def _frame(

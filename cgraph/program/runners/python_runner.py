@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from ..program import Program, whole_graph
 from ..statement import Execution
 from ..statements.call import spread
 from .runner import Record, Runner, Start
-
-if TYPE_CHECKING:
-    from .batch_code import LaneCode
 
 BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
 STATES = 512  # states of a batch that are run between looks at the keyboard
@@ -124,10 +121,6 @@ class PythonRunner(Runner):
                 result[:, column] = function(x)
 
         return sys.maxsize, one_by_one  # the interpreter runs one thread at a time
-
-    def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
-        """None: it is machine code."""
-        return None
 
     def text(self, x: str) -> str:
         """The text of one graph in Python, or in NumPy; of other programs their listing."""

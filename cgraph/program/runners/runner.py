@@ -137,13 +137,13 @@ class Runner(ABC):
     def text(self, x: str) -> str:
         """What one pass from this register to the record is run as."""
 
-    @abstractmethod
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Machine code of memories in lanes; none in Python, with a feed, or of what runs alone.
 
         clock: a register of length 1.  results: registers that are read after a run.  alike: whether a memory has the
         bits that it has alone; else sines and such are those of vectors.
         """
+        return None
 
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...

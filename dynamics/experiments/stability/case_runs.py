@@ -20,7 +20,6 @@ from .cases import RTOL, Criterion, StabilityCase
 
 SECTION = "Cases"
 STIFF, SMOOTH = ("radau", "rodas"), ("dop853", "dopri5")
-LARGE_CASE_METHODS = ("dop853",)  # of a large case
 EQUAL_STEPS: dict[str, dict[str, float]] = {  # case: method: step [s]
     "angle of 1e+15 rad": {"verlet": 1e-3},
 }
@@ -32,7 +31,7 @@ BLOCK = 4096  # rows whose invariants are taken at once
 def methods_of(case: StabilityCase) -> tuple[str, ...]:
     """The integrators to run a case with: two that choose their steps, and what `EQUAL_STEPS` has beside them."""
     if len(case.start) > LARGE_CASE:
-        return LARGE_CASE_METHODS
+        return SMOOTH[:1]
     return (STIFF if case.stiff else SMOOTH) + tuple(EQUAL_STEPS.get(case.name, ()))
 
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from cgraph._shared import Array
 
 from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations.formulations import inverse_dynamics
-from ...multibody.builders.planar_arm import planar_arm, planar_links
+from ...multibody.builders.planar_arm import PlanarLink, planar_arm, planar_links
 from ...multibody.trees.mechanism import Mechanism
 from ...multiprecision.decimal_numbers import working
 from ...multiprecision.graph_values import values_in_digits
@@ -167,23 +167,14 @@ class Arms:
         return moved
 
 
-class LinkParameters(NamedTuple):
-    """A link whose numbers are parameters."""
-
-    mass: Node
-    length: Node
-    center: Node
-    inertia: Node
-
-
 def arm_with_parameters(n: int) -> System:
     """A planar arm whose numbers are parameters: mass0.., length0.., center0.., inertia0.., damping0.., g."""
 
     def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node, p: dict[str, Node]) -> list[Node]:
-        links = [LinkParameters(*[p[f"{what}{i}"] for what in LinkParameters._fields]) for i in range(n)]
+        links = [PlanarLink(*[p[f"{what}{i}"] for what in PlanarLink._fields]) for i in range(n)]
         return by_centers(q, qd, links, p["g"])
 
-    names = [f"{what}{i}" for what in (*LinkParameters._fields, "damping") for i in range(n)]
+    names = [f"{what}{i}" for what in (*PlanarLink._fields, "damping") for i in range(n)]
     return System(
         lagrangian,
         [f"joint {i + 1}" for i in range(n)],

@@ -99,7 +99,7 @@ def sweep(
     best, stalled = math.inf, 0
     usual = solver.tolerances if solver.kind == CHOSEN else [float(INTERVALS * 2**k) for k in range(24)]
     for knob in usual if knobs is None else knobs:
-        tried, entry.stopped, took, _ = attempt(solver, metrics, knob)
+        tried, entry.stopped, took = attempt(solver, metrics, knob)
         if tried is None:
             if entry.tried or took > limit:  # a coarse knob may fail, and a finer one not
                 break
@@ -118,17 +118,8 @@ def sweep(
     return entry
 
 
-class Attempt(NamedTuple):
-    """The first run with a knob, or why there is none, and whether by an error; seconds of the processor it took."""
-
-    tried: Tried | None
-    why: str
-    took: float
-    raised: bool = False
-
-
-def attempt(solver: Solver, metrics: EndMetrics, knob: float) -> Attempt:
-    """The first run with that knob."""
+def attempt(solver: Solver, metrics: EndMetrics, knob: float) -> tuple[Tried | None, str, float]:
+    """The first run with that knob, or why there is none; and seconds of the processor that it took."""
     begin = time.process_time()
     try:
         run = solver.ready(knob)
@@ -138,11 +129,11 @@ def attempt(solver: Solver, metrics: EndMetrics, knob: float) -> Attempt:
         outcome = run.read(once.made)
     except Exception as error:  # noqa: BLE001 (whatever a run raises is a line in the report)
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
-        return Attempt(None, kind + " ".join(str(error).split())[:200], time.process_time() - begin, raised=True)
+        return None, kind + " ".join(str(error).split())[:200], time.process_time() - begin
     off = math.inf if outcome.status else metrics.at_end(outcome.x)
     if not math.isfinite(off):
-        return Attempt(None, outcome.status or "is not finite", once.processor)
-    return Attempt(Tried(knob, run, outcome, off, once), "", once.processor)
+        return None, outcome.status or "is not finite", once.processor
+    return Tried(knob, run, outcome, off, once), "", once.processor
 
 
 def time_in_turns(tried: Iterable[Tried], turns: int) -> None:

@@ -9,7 +9,7 @@ from cgraph import Node
 
 from .spatial import Triple, cross, plus, scaled
 from .spatial_vectors import Twist, Wrench
-from .turns import NEXT, Turn
+from .turns import NEXT, AxisTurn, Turn
 
 Rows = tuple[Triple, Triple, Triple]
 
@@ -51,7 +51,8 @@ class Inertia(NamedTuple):
     def turned(self, turn: Turn) -> Inertia:
         """Inertia in the axes before a turn."""
         second = rows(turn.second_moments(self.second))
-        about_z = self.about_z if turn.about_z or self.about_z is None else second[0][0] + second[1][1]
+        stays = self.about_z is None or (isinstance(turn, AxisTurn) and turn.axis == 2)
+        about_z = self.about_z if stays else second[0][0] + second[1][1]
         return Inertia(self.mass, turn.out(self.moment), second, about_z)
 
     def wrench(self, rate: Twist) -> Wrench:

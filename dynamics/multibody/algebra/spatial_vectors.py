@@ -48,10 +48,6 @@ class Wrench(NamedTuple):
         """Sum."""
         return Wrench(plus(self.torque, other.torque), plus(self.force, other.force))
 
-    def scaled(self, factor: float | Node) -> Wrench:
-        """Multiple."""
-        return Wrench(scaled(factor, self.torque), scaled(factor, self.force))
-
     def carried(self, velocity: Twist) -> Wrench:
         """Rate of a wrench that is carried along with a velocity: (w x n + v x f, w x f)."""
         torque = plus(cross(velocity.angular, self.torque), cross(velocity.linear, self.force))

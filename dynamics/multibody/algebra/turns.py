@@ -35,11 +35,6 @@ class AxisTurn(NamedTuple):
         return self.cos.value == 1.0 and self.sin.value == 0.0
 
     @property
-    def about_z(self) -> bool:
-        """Whether z stays as it is."""
-        return self.axis == 2
-
-    @property
     def reversed(self) -> AxisTurn:
         """R^T."""
         return AxisTurn(self.axis, self.cos, -self.sin, -self.angle)
@@ -92,11 +87,6 @@ class MatrixTurn(NamedTuple):
     @property
     def still(self) -> bool:
         """False: it is about any axis."""
-        return False
-
-    @property
-    def about_z(self) -> bool:
-        """False likewise."""
         return False
 
     @property

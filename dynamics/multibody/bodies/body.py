@@ -231,21 +231,13 @@ def quantity(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> flo
     if isinstance(value, Node) and not names_in([value]):
         value = evaluated(value, {}).item()
     if isinstance(value, str | Node):
-        _check_names(what, value)
+        for name in names_in([value]):
+            checked_name(f"a parameter of {what}", name, spaces=False)
         return symbol(value)
     if is_finite(value) and float(value) >= minimum:
         return float(value)
     bound = " and at least 0" if minimum == 0.0 else ""
     raise MechanismError(f"{what} must be finite{bound}, got {value!r:.80}{unit}")
-
-
-def _check_names(what: str, value: str | Node) -> None:
-    for name in names_in([value]):
-        checked_name(f"a parameter of {what}", name, spaces=False)
-
-
-def _mass(what: str, value: object) -> float | Node:
-    return quantity(what, value, " kg")
 
 
 def checked(body: Body) -> Body:
@@ -261,7 +253,7 @@ def checked(body: Body) -> Body:
     where, joint = f"body {body.name!r}", body.joint
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
-    mass, center = _mass(f"{where}: mass", body.mass), quantities(f"{where}: center", body.center)
+    mass, center = quantity(f"{where}: mass", body.mass, " kg"), quantities(f"{where}: center", body.center)
     with np.errstate(over="ignore"):
         beside = 0.0 if isinstance(mass, Node) or center.dtype == object else mass * float(center @ center)
     inertia = _inertia(f"{where}: inertia", body.inertia, beside)
@@ -358,7 +350,7 @@ def moment_rounding(scale: float, beside: float) -> float:
 
 
 BODY_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
-    "mass": _mass,
+    "mass": partial(quantity, unit=" kg"),
     "center": quantities,
     "inertia": _inertia,
 }

@@ -107,7 +107,12 @@ def tree(
     if len(given) != n:
         raise MechanismError(f"a tree needs a link for each of its {n} parents, got {len(given)}")
     for i, link in enumerate(given):
-        _check_link(i, link)
+        if not isinstance(link, Mapping):
+            raise MechanismError(f"links must be mappings, the fields of a Body, got {link!r:.60} for link {i + 1}")
+        if unknown := [name for name in link if name not in _FIELDS]:
+            raise MechanismError(f"link {i + 1} has {', '.join(_FIELDS)}, got {unknown[0]!r:.60}")
+        if "joint" not in link:
+            raise MechanismError(f"link {i + 1} needs a joint, got {', '.join(link) or 'nothing'}")
     names = [f"link {i + 1}" for i in range(n)]
     bodies = [
         Body(name, parent=WORLD if parent < 0 else names[parent], **link)
@@ -119,16 +124,6 @@ def tree(
 def _check_sequence(what: str, given: object) -> None:
     if isinstance(given, str) or not isinstance(given, Sequence | np.ndarray):
         raise MechanismError(f"{what} must be a sequence, got {type(given).__name__}: {given!r:.60}")
-
-
-def _check_link(i: int, link: object) -> None:
-    """Raises MechanismError for what does not describe a link by fields of `Body`."""
-    if not isinstance(link, Mapping):
-        raise MechanismError(f"links must be mappings, the fields of a Body, got {link!r:.60} for link {i + 1}")
-    if unknown := [name for name in link if name not in _FIELDS]:
-        raise MechanismError(f"link {i + 1} has {', '.join(_FIELDS)}, got {unknown[0]!r:.60}")
-    if "joint" not in link:
-        raise MechanismError(f"link {i + 1} needs a joint, got {', '.join(link) or 'nothing'}")
 
 
 def _rod(axis: Array, parent: int) -> dict[str, object]:

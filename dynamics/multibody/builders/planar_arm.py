@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,17 +17,18 @@ from ..bodies.body import WORLD, Body, Joint
 from ..parameters import Quantity, bound, symbol
 from ..trees.mechanism import Mechanism
 
+Number = TypeVar("Number", float, Node)
 AXIS = (0.0, -1.0, 0.0)  # of the hinges: a positive angle swings the hanging arm towards +x
 TIP = "tip"  # the body without mass that marks the end of the last link
 
 
-class PlanarLink(NamedTuple):
-    """One link; the joint that carries it is at its upper end."""
+class PlanarLink(NamedTuple, Generic[Number]):
+    """One link, of floats or nodes; the joint that carries it is at its upper end."""
 
-    mass: float  # kg
-    length: float  # m, joint to joint
-    center: float  # m, joint to center of mass
-    inertia: float  # kg m^2, about the center of mass
+    mass: Number  # kg
+    length: Number  # m, joint to joint
+    center: Number  # m, joint to center of mass
+    inertia: Number  # kg m^2, about the center of mass
 
 
 def planar_arm(
@@ -126,7 +127,7 @@ def arm_of_links(
     return Mechanism(bodies, (0.0, 0.0, -gravity), parameters=parameters or {})
 
 
-def planar_links(arm: Mechanism) -> list[PlanarLink]:
+def planar_links(arm: Mechanism) -> list[PlanarLink[float]]:
     """The links of a planar arm, from the base outwards."""
     *bodies, _ = numbers_alone = arm.bind().bodies
     drops = [-float(np.asarray(body.joint.position)[2]) for body in numbers_alone[1:]]

@@ -216,7 +216,7 @@ def _motion(mechanism: Mechanism, body: Body, q: Array, qd: Array) -> tuple[Free
     """Motion of a body of the mechanism, and the Jacobians (3, n) of its center's velocity and of its omega."""
     graph = mechanism.motion(body.name, np.asarray(body.center))
     rates = np.vstack([qd, np.eye(len(qd))])  # the state's own, then each coordinate alone
-    found = graph.evaluate(_named(q=q, qd=rates.T))
+    found = graph.evaluate(dict(zip(graph.input_names, [*q, *rates.T], strict=True)))
     of = {name: np.broadcast_to(value, len(rates)) for name, value in found.items()}
     position, velocity, omega = (np.array([of[name] for name in names.split()]) for names in _COMPONENTS)
     turn = np.array([[of[f"R_{i}_{j}"][0] for j in range(3)] for i in range(3)])
@@ -228,7 +228,3 @@ def _inertia_alone(mechanism: Mechanism) -> Mechanism:
     bodies = [replace(body, joint=replace(body.joint, stiffness=0.0)) if body.joint.stiffness else body
               for body in mechanism.bodies]  # fmt: skip
     return replace(mechanism, bodies=bodies, gravity=(0.0, 0.0, 0.0), forces=(), parameters={})
-
-
-def _named(**groups: Array) -> dict[str, float | Array]:
-    return {f"{name}{i}": value for name, values in groups.items() for i, value in enumerate(values)}

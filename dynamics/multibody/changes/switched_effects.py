@@ -19,6 +19,7 @@ FREE_FALL = (0.0, 0.0, -9.81)  # m/s^2, put in to count what gravity would take
 SKEW = (-3.0, -5.0, -7.0)  # m/s^2, along no axis
 NUMBER = 0.3  # put in for a damping, stiffness, .. that a model has not
 _JOINT = {"damping": "damping", "springs": "stiffness", "armature": "armature"}
+_ABLE = {"springs": "sprung", "armature": "geared"}  # what the type of a joint that can have it says
 
 
 def has_effect(model: Model, effect: str) -> bool:
@@ -77,7 +78,7 @@ def absent_parts(model: Mechanism, given: Mechanism) -> Iterator[tuple[str, str,
             yield f"gravity at {_listed(free)}", "it does no work there", changed(model, gravity=SKEW)
     for effect, name in _JOINT.items():
         had = {body.name for body in given.moving if not vanishes(getattr(body.joint, name))}
-        able = [body for body in model.moving if _can_have(body, name)]
+        able = [body for body in model.moving if getattr(body.joint.type, _ABLE.get(effect, "moves"))]
         without = [body.name for body in able if vanishes(getattr(body.joint, name)) and body.name not in had]
         if without:
             yield f"{effect} of {_listed(without)}", "it is zero", _with(model, effect, NUMBER, without)
@@ -97,11 +98,6 @@ def _in_parts(model: Mechanism) -> Mechanism:
     if len(bodies) == len(model.bodies):
         return model
     return replace(model, bodies=bodies, locked=locked_parts(model.bodies, model.locked))
-
-
-def _can_have(body: Body, name: str) -> bool:
-    kind = body.joint.type
-    return {"stiffness": kind.sprung, "armature": kind.geared}.get(name, True)
 
 
 def _has_inertia(body: Body) -> bool:

@@ -2,11 +2,15 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 import cgraph as cg
 from cgraph import Node
+from cgraph._shared import Array
 
-from ..algebra.spatial import Triple, cross
-from .joint_type import NodeMatrix
+from ..algebra import spatial
+from ..algebra.spatial import ZERO, Triple, cross
+from .joint_type import NodeMatrix, SpatialJoint
 
 NAMES = ("qw", "qx", "qy", "qz")
 UNITS = ("1", "1", "1", "1")
@@ -67,3 +71,32 @@ def normalized(e: Sequence[Node]) -> list[Node]:
     w, x, y, z = e
     length = cg.sqrt(w * w + x * x + (y * y + z * z))
     return [each / length for each in e]
+
+
+class QuaternionJoint(SpatialJoint):
+    """A joint that turns the body by its last four coordinates, with its last three velocities as angular ones.
+
+    The coordinates before are places along the joint's axes, whose rates are the velocities before.
+    """
+
+    def rotation(self, q: Sequence[Node]) -> NodeMatrix:
+        """Rotation of the quaternion."""
+        return rotation(q[-4:])
+
+    def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
+        """The linear velocities, and the rate of the quaternion."""
+        return [*u[:-3], *rate(q[-4:], u[-3:])]
+
+    def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
+        """Zero, and omega x the angular momentum."""
+        return [*[ZERO for _ in u[:-3]], *structure(u[-3:], p[-3:])]
+
+    def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
+        """Coordinates with a quaternion of length 1."""
+        return [*q[:-4], *normalized(q[-4:])]
+
+    def resists(self, mass: float, inertia: Array) -> bool:
+        """Inertia about every axis, more than rounding leaves of the largest; and mass, where it slides."""
+        moments = np.linalg.eigvalsh(inertia)
+        turned = bool(moments[0] > spatial.SUM_ROUNDING * moments[2])
+        return turned and (mass > 0.0 or len(self.velocities) == 3)

@@ -9,7 +9,6 @@ and no new code.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -85,29 +84,28 @@ class RecursiveInverseDynamics:
         x, u, a = (row.tolist() for row in rows)
         states = [[*x[place.q], *u[place.u], *a[place.u]] for place in self._places]
         motions: list[list[float]] = []
-        for parent, link, kernel, state in zip(self._parents, self._links, self._kernels, states, strict=True):
+        for parent, link, (forwards, _), state in zip(self._parents, self._links, self._kernels, states, strict=True):
             carrier = motions[parent] if parent >= 0 else self._ground
-            motions.append(list(kernel.forwards.values([*carrier, *state, *link])))
+            motions.append(list(forwards.values([*carrier, *state, *link])))
         bars = [[0.0] * WRENCH for _ in states]
         tau = np.empty(self.n)
         for i in reversed(range(len(states))):
             parent = self._parents[i]
             carrier = motions[parent] if parent >= 0 else self._ground
-            values = self._kernels[i].backwards.values([*carrier, *states[i], *self._links[i], *bars[i]])
+            values = self._kernels[i][1].values([*carrier, *states[i], *self._links[i], *bars[i]])
             tau[self._places[i].u] = values[WRENCH:]
             if parent >= 0:
                 bars[parent] = [a + b for a, b in zip(bars[parent], values[:WRENCH], strict=True)]
         return tau
 
 
-class _Kernels(NamedTuple):
-    forwards: Compiled  # parent's motion, q, qd, qdd, link -> motion
-    backwards: Compiled  # the same, wrench of what the body carries -> what the parent carries by it; tau
-
-
 @memo(64)
-def _kernels(joint: JointType) -> _Kernels:
-    """Kernels of a link on that type of joint, whatever its numbers are."""
+def _kernels(joint: JointType) -> tuple[Compiled, Compiled]:
+    """Kernels of a link on that type of joint, whatever its numbers are.
+
+    Forwards (parent's motion, q, qd, qdd, link) -> motion; backwards, of these and the wrench of what the body carries,
+    -> what the parent carries by it, and tau.
+    """
     parent, velocity, bars = _variables("s", MOTION), _variables("v", 3), _variables("bar", WRENCH)
     q = _variables("q", len(joint.coordinates))
     qd, qdd = (_variables(name, len(joint.velocities)) for name in ("qd", "qdd"))
@@ -127,7 +125,7 @@ def _kernels(joint: JointType) -> _Kernels:
         tau = [force + link.damping * u for force, u in zip(back[WRENCH:], qd, strict=True)]
     inputs = [*parent, *q, *qd, *qdd, *numbers]
     forwards = [*motion.omega, *acceleration.angular, *acceleration.linear]
-    return _Kernels(_compiled(inputs, forwards), _compiled([*inputs, *bars], [*back[:WRENCH], *tau]))
+    return _compiled(inputs, forwards), _compiled([*inputs, *bars], [*back[:WRENCH], *tau])
 
 
 def _compiled(inputs: Sequence[Node], outputs: Sequence[Node]) -> Compiled:

@@ -59,14 +59,13 @@ def lock_joints(bodies: Sequence[Body], at: Mapping[str, float | ArrayLike]) -> 
     Raises MechanismError for a body that has no joint to lock, and a coordinate that is not finite.
     """
     by_name = {body.name: body for body in bodies}
+    welds: dict[str, Joint] = {}
     for name, value in at.items():
-        if not by_name[name].joint.type.moves:
+        body = by_name[name]
+        if not body.joint.type.moves:
             raise MechanismError(f"body {name!r} is welded on and has no joint to lock")
-        locked_at(by_name[name], value)
-    return [
-        replace(body, joint=_weld_at(body.joint, locked_at(body, at[body.name]))) if body.name in at else body
-        for body in bodies
-    ]
+        welds[name] = _weld_at(body.joint, locked_at(body, value))
+    return [replace(body, joint=welds[body.name]) if body.name in welds else body for body in bodies]
 
 
 def locked_at(body: Body, value: Any) -> Array:

@@ -163,11 +163,9 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
         if body.name not in moving | carrying and not body.mass and not np.any(np.asarray(body.inertia)):
             marks.setdefault(above[body.name], []).append(body.name)
     pins: dict[str, list[tuple[str, ArrayLike]]] = {}
-    for loop in mechanism.loops:
-        ends = ((loop.body, loop.at), (loop.to, loop.to_at)) if loop.kind != "coupling" else ()
-        for name, at in ends:
-            pins.setdefault(name if name in moving else above.get(name, name), []).append((name, at))
-    for name, at in contact_surfaces(mechanism.forces).centers:
+    held = [loop for loop in mechanism.loops if loop.kind != "coupling"]
+    ends = [end for loop in held for end in ((loop.body, loop.at), (loop.to, loop.to_at))]
+    for name, at in [*ends, *contact_surfaces(mechanism.forces).centers]:
         pins.setdefault(name if name in moving else above.get(name, name), []).append((name, at))
     for body in mechanism.moving:
         yield from pins.get(body.name, [])
@@ -182,12 +180,9 @@ def view(points: Array) -> Array:
     """Directions of the picture among points, (.., 3): (2, 3), its right and its up."""
     extent = np.ptp(points.reshape(-1, 3), axis=0)
     flat = extent <= _FLAT * extent.max()
-    if flat[1]:
-        return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    if flat[0]:
-        return np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    if flat[2]:
-        return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    for across in (1, 0, 2):
+        if flat[across]:
+            return np.delete(np.eye(3), across, axis=0)
     return np.array([[-0.45, 0.9, 0.0], [-0.25, -0.12, 1.0]])
 
 

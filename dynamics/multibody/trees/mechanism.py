@@ -125,7 +125,10 @@ class Mechanism(Structure):
         kinds = {"bodies": (Body,), "forces": (Force, JointForce, Contact), "loops": (Loop,), "left_out": (str,)}
         for what, allowed in kinds.items():  # kept, so that an iterator is read once
             object.__setattr__(self, what, listed(what, allowed, getattr(self, what)))
-        self._check_parameters([part for body in self.bodies for part in checked_parts(body)])
+        parts = [part for body in self.bodies for part in checked_parts(body)]
+        for name, value in require_mapping("parameters", self.parameters, "name: value").items():
+            parameter_value(name, value)  # before one is put in
+        self._require_values(self.parameters, parts)
         seen: set[str] = set()
         for name in self.coordinates:
             if name in seen:
@@ -144,11 +147,6 @@ class Mechanism(Structure):
                 )
         for name, value in self.parameter_values.items():
             parameter_value(name, value)
-
-    def _check_parameters(self, bodies: Sequence[Body]) -> None:
-        for name, value in require_mapping("parameters", self.parameters, "name: value").items():
-            parameter_value(name, value)  # before one is put in
-        self._require_values(self.parameters, bodies)
 
     def _repr_html_(self) -> str | None:
         """The equations that a notebook shows as formulas, when a drawing package is installed (extra `viz`)."""

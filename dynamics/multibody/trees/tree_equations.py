@@ -127,12 +127,6 @@ class TreeEquations:
         """The links, by default the bodies' own, at a state."""
         return link_states(self.bodies, links or self.links, self.parents, q, u, u_dot)
 
-    @cached_property
-    def _hinged_chain(self) -> bool:
-        """Whether hinges without parameters follow one on another: their M takes the fewest nodes by composites."""
-        hinged = all([joint.kind == "revolute" for joint in self._types])
-        return hinged and self._numeric and self.parents == list(range(-1, len(self.bodies) - 1))
-
     def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         """Lagrangian of each body, tagged with its name and energy."""
         with building(Builder()):
@@ -178,7 +172,8 @@ class TreeEquations:
             planes = [motion.plane for motion in self._motions(states)]
             carried = [PlacedLink(at, plane, planes[at.parent]) for at, plane in zip(states, planes, strict=False)]
             columns = mass_matrix_columns(carried, len(qd))
-        if self._hinged_chain:
+        hinged = self._numeric and all([joint.kind == "revolute" for joint in self._types])
+        if hinged and self.parents == list(range(-1, len(self.bodies) - 1)):  # one on another: these are the fewest
             return columns
         derived = hessian_nodes(lagrangian, qd, build)  # with nodes that other equations have as well
         return columns if size_of(columns) < WORTH * size_of(derived) else derived

@@ -5,7 +5,7 @@ import math
 import cgraph as cg
 
 from ....systems.system import System
-from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
+from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, energy_criterion
 
 STIFFNESS = 9.81  # 1/s^2, gravity over length
 TINY = 5e-324  # the smallest positive float64
@@ -29,7 +29,6 @@ def upright(angle: float, name: str, t_end: float, growth: float) -> StabilityCa
         criteria=(energy_criterion(2.0 * STIFFNESS),),
         size=(math.pi, math.sqrt(STIFFNESS)),
         growth=growth,
-        invariants=conserved(),
     )
 
 
@@ -55,7 +54,6 @@ def large_angle(angle: float) -> StabilityCase:
             ),
         ),
         size=(angle, math.sqrt(STIFFNESS)),
-        invariants=conserved(),
     )
 
 
@@ -71,7 +69,6 @@ def spinning(velocity: float, growth: float) -> StabilityCase:
         criteria=(Criterion("energy", SLACK * RTOL, "nothing takes energy in or out", 0.5 * velocity**2),),
         size=(1e3, velocity),
         growth=growth,
-        invariants=conserved(),
     )
 
 

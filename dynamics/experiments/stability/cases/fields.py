@@ -9,7 +9,7 @@ import cgraph as cg
 
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
-from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
+from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, energy_criterion, error_criterion
 
 GRAVITY = 9.81  # m/s^2
 
@@ -31,7 +31,6 @@ def charged_particle(growth: float) -> StabilityCase:
         criteria=(energy_criterion(0.625, "a magnetic field does no work"),),
         size=(0.1, 0.1, 1.0, 1.0),
         growth=growth,
-        invariants=conserved(),
     )
 
 
@@ -48,7 +47,6 @@ def relativistic_oscillator(growth: float) -> StabilityCase:
             Criterion("energy", 1e2 * SLACK * RTOL, "near c an error of the speed counts by the cube of gamma", 10.0),
         ),
         growth=growth,
-        invariants=conserved(),
     )
 
 

@@ -13,7 +13,6 @@ from ...accuracy_task import (
     ATOL,
     Criterion,
     StabilityCase,
-    conserved,
     conserved_states,
     energy_criterion,
     error_criterion,
@@ -55,7 +54,6 @@ def _undamped(stiffness: float, growth: float | None) -> StabilityCase:
         stiff=stiffness > 1e6,
         size=(stretch, 1.0, math.sqrt(stiffness) * stretch, math.sqrt(GRAVITY)),
         growth=growth,
-        invariants=conserved(),
         series=growth is not None,
     )
 
