@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 import numpy as np
@@ -48,22 +48,15 @@ _OF_AN_ACTUATOR = ("actuator_armature", "actuator_damping", "actuator_dampingpol
 _NOT_LINEAR = ("jnt_stiffnesspoly", "jnt_springyield", "dof_dampingpoly")
 
 
-class _Names(NamedTuple):
-    """All names that are taken: of bodies, MuJoCo's first and without a gap, and of joints."""
-
-    bodies: list[str]
-    joints: list[str]
-
-
 def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
     """The mechanism of MuJoCo's model. Raises MechanismError for what a mechanism cannot have."""
-    names = _Names(_body_names(mj), [mj.joint(j).name for j in range(mj.njnt)])
+    names, labels = _body_names(mj), [mj.joint(j).name for j in range(mj.njnt)]
     left_out = refused_or_left_out(_not_modelled(mj), _acting_from_outside(mj, smooth), ignore)
     bodies: list[Body] = []
     ends = [(WORLD, np.zeros(3))]  # of each MuJoCo body: the last of its chain, and its origin in that one's frame
     with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
         for body in range(1, mj.nbody):
-            chain, origin = _chain(mj, body, names, *ends[mj.body_parentid[body]])
+            chain, origin = _chain(mj, body, names, labels, *ends[mj.body_parentid[body]])
             bodies += chain
             ends.append((chain[-1].name, origin))
     gravity = mj.opt.gravity * (not disabled(mj, "GRAVITY"))
@@ -111,23 +104,26 @@ def _unused(name: str, names: Sequence[str]) -> str:
     return name if name not in names else _unused(name + "'", names)
 
 
-def _chain(mj: MjModel, body: int, names: _Names, parent: str, origin: Array) -> tuple[list[Body], Array]:
+def _chain(
+    mj: MjModel, body: int, names: list[str], labels: Sequence[str], parent: str, origin: Array
+) -> tuple[list[Body], Array]:
     """One of MuJoCo's bodies as a chain with one joint each, and the origin of its frame in that of the chain's last.
 
     MuJoCo turns a body about a point (its joint's `pos`) other than its origin; here the body's origin is that point.
+    names, labels: all that are taken, of bodies, MuJoCo's first and without a gap, and of joints.
     origin: of the parent's MuJoCo frame in that of `parent`.
     """
-    name = names.bodies[body]
+    name = names[body]
     joints = range(mj.body_jntadr[body], mj.body_jntadr[body] + mj.body_jntnum[body])
     chain: list[Body] = []
     position, orientation = origin + mj.body_pos[body], spatial.from_quaternion(mj.body_quat[body])
     for j in joints:
         called = name
         if j != joints[-1]:
-            called = _unused(f"{name} {names.joints[j] or f'joint {j}'}", names.bodies)
-            names.bodies.append(called)
+            called = _unused(f"{name} {labels[j] or f'joint {j}'}", names)
+            names.append(called)
         anchor = mj.jnt_pos[j] if TYPES[_kind(mj, j)].turns else np.zeros(3)
-        label = names.joints[j] or _unused(called, names.joints)
+        label = labels[j] or _unused(called, labels)
         link = replace(_joint(mj, j, position + orientation @ anchor, orientation), name=label * (label != called))
         chain.append(Body(called, link, parent))
         parent, position, orientation = called, -anchor, np.eye(3)

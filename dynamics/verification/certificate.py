@@ -208,7 +208,10 @@ class _Checks:
     def always(self) -> Iterator[Residual]:
         """Residuals of every Lagrangian."""
         yield from self._mass_matrix()
-        yield self._bias()
+        # Bodies state their bias by Newton and Euler; the chain rule asks nothing but the Lagrangian.
+        still, pushed = self.value(inverse_dynamics(self.system, "chain_rule"), qdd=None), self.pushed
+        equation = "bias = inverse dynamics at qdd = 0, without damping and forces"
+        yield rounded(equation, self.bias - still - pushed, np.abs(still) + np.abs(pushed))
         yield self._forward()
         yield self._power()
         yield self._energy()
@@ -255,12 +258,6 @@ class _Checks:
         note = f"{kind}smallest eigenvalue {smallest:.1e}, scaled"
         equation = "M: positive definite" + " on motions that the constraints admit" * self.held.any
         yield Residual(equation, max(0.0, rounding - smallest), POSITIVE, note)
-
-    def _bias(self) -> Residual:
-        """Bodies state their bias by Newton and Euler; the chain rule asks nothing but the Lagrangian."""
-        still, pushed = self.value(inverse_dynamics(self.system, "chain_rule"), qdd=None), self.pushed
-        equation = "bias = inverse dynamics at qdd = 0, without damping and forces"
-        return rounded(equation, self.bias - still - pushed, np.abs(still) + np.abs(pushed))
 
     def _forward(self) -> Residual:
         tau, qdd = self.at["tau"], self.accelerations

@@ -3,7 +3,7 @@
 import math
 import statistics
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -118,12 +118,7 @@ COLUMNS = (
 
 def to_csv(report: WorkPrecision) -> str:
     """The points of a report as CSV, a line each; an empty cell is what is not known."""
-    rows = []
-    for curve in report.curves:
-        for p in curve.points:
-            first = (curve.name, curve.kind, curve.order, curve.fitted, p.knob, p.step, p.seconds, p.median)
-            rest = (p.steps, p.rejected, p.evaluations, p.error, p.largest, p.drift)
-            rows.append([*first, *rest])
+    rows = [(each.name, each.kind, each.order, each.fitted, *astuple(p)) for each in report.curves for p in each.points]
     return csv_text(COLUMNS, rows)
 
 

@@ -24,14 +24,7 @@ from ..algebra.spatial_vectors import Twist
 from ..bodies.joint_coordinates import places
 from ..joints import JointType
 from ..sweeps.links import Link, LinkState
-from ..sweeps.outward import (
-    Motion,
-    acceleration_in_space,
-    ground,
-    propagate_acceleration,
-    propagate_motion,
-    wrench,
-)
+from ..sweeps.outward import Motion, acceleration_in_space, ground, propagate_acceleration, propagate_motion, wrench
 from ..trees.mechanism import Mechanism, require_mechanism
 
 MOTION, WRENCH = 9, 6  # numbers: angular velocity, angular and linear acceleration; force and moment

@@ -187,12 +187,6 @@ def link_states(
     ]
 
 
-def parents_of(bodies: Sequence[Body]) -> list[int]:
-    """Index of the body that carries each body, -1 for the world."""
-    index = {body.name: i for i, body in enumerate(bodies)}
-    return [index.get(body.parent, -1) for body in bodies]
-
-
 def axes_of(body: Body) -> Array:
     """The axes of the body's motion, as columns in the body's; where its joint has an axis, the third is that."""
     return body.joint.type.axes(np.asarray(body.joint.axis))

@@ -41,16 +41,7 @@ from ..sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from ..sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from ..sweeps.links import Link
 from .joint_positions import skeleton
-from .structure import (
-    Structure,
-    bound_body,
-    bound_force,
-    changed,
-    checked_parts,
-    listed,
-    require_values,
-    used_names,
-)
+from .structure import Structure, bound_body, bound_force, changed, checked_parts, listed, require_values, used_names
 from .tree_equations import TreeEquations
 
 __all__ = [

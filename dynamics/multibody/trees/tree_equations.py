@@ -19,7 +19,7 @@ from ..bodies.body import Body, quantities
 from ..joints import JointType
 from ..sweeps.base_parameters import base_parameter_links, without_axial_moments
 from ..sweeps.equation_links import equation_links
-from ..sweeps.links import Link, LinkState, link, link_states, parents_of
+from ..sweeps.links import Link, LinkState, link, link_states
 from ..sweeps.mass_matrix import PlacedLink, mass_matrix_columns, size_of
 from ..sweeps.outward import (
     Acceleration,
@@ -55,7 +55,8 @@ class TreeEquations:
     @cached_property
     def parents(self) -> list[int]:
         """Index of the body that carries each body, -1 for the world."""
-        return parents_of(self.bodies)
+        index = {body.name: i for i, body in enumerate(self.bodies)}
+        return [index.get(body.parent, -1) for body in self.bodies]
 
     @cached_property
     def links(self) -> list[Link]:

@@ -9,15 +9,7 @@ import cgraph as cg
 
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
-from ...accuracy_task import (
-    RTOL,
-    SLACK,
-    Criterion,
-    StabilityCase,
-    conserved,
-    conserved_states,
-    energy_criterion,
-)
+from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, conserved, conserved_states, energy_criterion
 
 INERTIA = (1.0, 2.0, 3.0)  # kg m^2, principal
 OMEGA = (0.001, 1.0, 0.002)  # rad/s in the body's axes: about the middle axis, and a little aside
@@ -105,10 +97,7 @@ def middle_axis(growth: float) -> StabilityCase:
         q=start[:3],
         qd=start[3:],
         t_end=100.0,
-        criteria=(
-            energy_criterion(1.0),
-            Criterion("momentum", SLACK * RTOL, "no torque", 4.0),
-        ),
+        criteria=(energy_criterion(1.0), Criterion("momentum", SLACK * RTOL, "no torque", 4.0)),
         size=(100.0, 1.0, 10.0, 1.0, 1.0, 1.0),
         growth=growth,
         invariants=conserved(momentum=_total),

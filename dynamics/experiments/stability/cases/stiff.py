@@ -9,14 +9,7 @@ import cgraph as cg
 
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
-from ...accuracy_task import (
-    ATOL,
-    Criterion,
-    StabilityCase,
-    conserved_states,
-    energy_criterion,
-    error_criterion,
-)
+from ...accuracy_task import ATOL, Criterion, StabilityCase, conserved_states, energy_criterion, error_criterion
 
 GRAVITY = 9.81  # m/s^2
 RATIO = 10.0  # of damping to the critical one
