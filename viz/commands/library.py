@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from dynamics.multibody.bodies.joint_coordinates import display_units
     from dynamics.multibody.changes.pruning import PruneResult
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
-    from dynamics.simulation.limits_left import limits_left
     from dynamics.simulation.run_options import Steps
     from dynamics.verification.certificate import certify
+    from dynamics.verification.limits_left import limits_left
 
     from .. import theme
     from ..graph_drawing.dot import to_dot

@@ -25,7 +25,7 @@ from ...systems.ode_system import OdeSystem
 from ...systems.system import System
 from ..applied_force import Hold, SampledController
 from ..events.event import Event, EventProgram, as_events, event_program
-from ..events.modes import Modes, Turn
+from ..events.modes import Modes, Turn, entries
 from ..outcome import MotionError, Recorder
 from ..run import Run
 from ..run_options import METHOD, Options, Span, Steps, known_options, time_span
@@ -34,7 +34,6 @@ from ..steps.dense_output import Indices
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
 from .motion_programs import MotionEquations, motion_equations, outputs_at, pullback, sliding_equations
-from .surfaces_at_once import entries
 
 Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.simulation.limits_left import Pair, limits_left
+from dynamics.verification.limits_left import Pair, limits_left
 
 NUMBER = r"(-?[\d.e+-]+)"
 SAID = re.compile(rf"(\w+) of (\w+) leaves .* at {NUMBER} s, and is {NUMBER} .* at {NUMBER} s")

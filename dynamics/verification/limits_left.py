@@ -8,7 +8,7 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from .trajectory import Trajectory
+from ..simulation.trajectory import Trajectory
 
 Pair = tuple[float, float]
 ROUNDING = 2.0**-40  # of a coordinate: by less it is not beyond
