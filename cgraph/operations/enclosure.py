@@ -10,10 +10,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ..core.builder import Builder
+from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node, apply, as_node, variable
 from ..core.scope import building
-from ..util.require import require_graph
+from ..util.require import require_graph, require_sequence
 from .bounds import REAL_LINE, Bounded, Rule, rule_of
 from .operation import Interval
 from .table import where
@@ -39,6 +40,9 @@ def enclosure(graph: Graph, exact: Sequence[str | Node] = ()) -> Graph:
     {'y.low': 1.0, 'y.high': 5.0}
     """
     require_graph("enclosure", graph)
+    for each in require_sequence("exact", exact, "inputs of the graph"):
+        if (each.name if isinstance(each, Node) else each) not in graph.input_names:
+            raise GraphError(f"exact: the graph has no input {each!r:.60} (it has {', '.join(graph.input_names)})")
     chosen = graph.select_inputs(exact) if exact else ()
     single, wide = [[node for node in graph.inputs if (node in chosen) is each] for each in (True, False)]
     lows, highs = [[variable(f"{node.name}.{end}") for node in wide] for end in ("low", "high")]

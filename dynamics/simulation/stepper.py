@@ -186,6 +186,9 @@ class Stepper(ABC):
                 if crossing is not None or (log is not None and (log.ended or log.restart)):
                     self.status = ""  # of a step beyond
                     break
+            if self._numbers[self._stop] == TOO_SMALL and self.modes is not None and not self._pending:
+                found = self.modes.touched(self.t, self.x, self._given) if self.program.adaptive else None
+                self._pending = [] if found is None else [(found[0], self.t, found[1], self._number("h"))]
             if self._pending:
                 self._turn(span.t_end)
                 continue

@@ -203,7 +203,13 @@ def _first_zero(
 
 
 def told_by_slopes(
-    one: Quantities, p: Array, block: StepBlock, cells: tuple[Indices, Array, Array], begins: Array, ends: Array
+    one: Quantities,
+    p: Array,
+    block: StepBlock,
+    cells: tuple[Indices, Array, Array],
+    begins: Array,
+    ends: Array,
+    noise: Array | float = 0.0,
 ) -> tuple[Flags, Flags, Flags]:
     """Of a quantity, with values at both ends of cells: whether it keeps its sign, goes one way, and is bounded.
 
@@ -217,7 +223,7 @@ def told_by_slopes(
     with np.errstate(all="ignore"):
         # its size lies above the lines of the least slope from the left and the largest from the right, which meet here
         meet = (begins * most - ends * least + most * least * width) / (most - least)
-    clear = bounded & (np.where(one_way, np.minimum(begins, ends), meet) > 0.0)
+    clear = bounded & (np.where(one_way, np.minimum(begins, ends), meet) > noise)
     return clear, one_way & bounded, bounded
 
 

@@ -124,9 +124,10 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
     done, beyond, new = none.copy(), none.copy(), ~none
     while True:
         fresh = cells.take(new)
-        clear, goes_one_way, bounded = told_by_slopes(watched, p, steps.block, fresh[:3], fresh.g_a, fresh.g_b)
+        noise = 2.0 * steps.rounding(fresh.rows, fresh.b)
+        clear, goes_one_way, bounded = told_by_slopes(watched, p, steps.block, fresh[:3], fresh.g_a, fresh.g_b, noise)
         size = np.maximum(np.abs(fresh.g_a), np.abs(fresh.g_b))
-        told = clear | goes_one_way | (bounded & (size <= 2.0 * steps.rounding(fresh.rows, fresh.b)))
+        told = clear | goes_one_way | (bounded & (size <= noise))
         nothing = np.isnan(fresh.g_a) & np.isnan(fresh.g_b)
         done[new] = told | nothing | (fresh.b - fresh.a <= SHORTEST)
         rise = fresh.g_b - fresh.g_a

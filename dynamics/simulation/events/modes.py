@@ -135,6 +135,18 @@ class Modes:
             return
         self._decide(t, x, p, crossed, number)
 
+    def touched(self, t: float, x: Array, p: Sequence[float]) -> tuple[int, Array] | None:
+        """The margin that is zero to rounding at a state, if one is: what a step does not pass; and the state on it."""
+        errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))[:, None]
+        point, (watched, turns) = self._point(t, x, p, self.values[:, None]), self._watched
+        allowed = outputs_of(_gap_errors(self.plain), np.concatenate([point, errors]))[[k for k, _ in turns], 0]
+        near = np.abs(outputs_of(watched.values, point)[:, 0]) <= allowed
+        if not near.any() or self.slid.any():
+            return None
+        number = int(np.argmax(near))
+        normal = _slopes(watched.part(number).values, point[:, 0], len(x))[:-1]
+        return number, x - outputs_of(watched.values, point)[number, 0] * normal / (normal @ normal)
+
     @property
     def _watched(self) -> tuple[Quantities, tuple[tuple[int, int], ...]]:
         switches = self.problem.switches
@@ -348,7 +360,7 @@ def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Grap
     result = list[Graph]()
     for k, number in others:
         margin, own = modes.margin(before, number), modes.margin(before, first[1])
-        if _is_same(margin, own, point):
+        if _is_same(margin, own, point) or not _is_zero(margin, point, modes.plain.size):
             between[k] = after.modes[k]
             continue
         following = [*between]
@@ -380,6 +392,12 @@ def _slopes(margin: Graph, point: Array, m: int) -> Array:
     """Slopes of a margin by states and t."""
     slopes = cg.gradient(margin, list(margin.input_names[: m + 1]))
     return values_of(slopes, point, 1)[:, 0]
+
+
+def _is_zero(margin: Graph, point: Array, m: int) -> bool:
+    """Whether a margin is zero there, and not turned by the mode of an earlier one on which it depends."""
+    value = values_of(margin, point, 1)[0, 0]
+    return bool(abs(value) <= ALIKE * (np.abs(_slopes(margin, point, m)) @ np.abs(point[: m + 1])))
 
 
 def _is_same(a: Graph, b: Graph, point: Array) -> bool:
