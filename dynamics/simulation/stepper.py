@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from cgraph._shared import Array
 
 from ..integrators import Problem
-from ..integrators.step_control import CROSSED, DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
+from ..integrators.step_control import CROSSED, DONE, RESOLUTION, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from .applied_force import Hold
 from .events.crossing_search import Crossing, outputs_of
 from .events.event import EventProgram
@@ -186,11 +186,14 @@ class Stepper(ABC):
                 if crossing is not None or (log is not None and (log.ended or log.restart)):
                     self.status = ""  # of a step beyond
                     break
-            if self._numbers[self._stop] == TOO_SMALL and self.modes is not None and not self._pending:
-                found = self.modes.touched(self.t, self.x, self._given) if self.program.adaptive else None
+            if self.modes is not None and self._is_refused and not self._pending:  # a surface that no step passes
+                found = self.modes.touched(self.t, self.x, self._given)
                 self._pending = [] if found is None else [(found[0], self.t, found[1], self._number("h"))]
             if self._pending:
                 self._turn(span.t_end)
+                continue
+            if self.modes is not None and self._is_refused and self._shorten():
+                self.status = ""
                 continue
             if log is None:
                 return
@@ -282,6 +285,15 @@ class Stepper(ABC):
         )
         return own or self.every_step or span.times is None or self.events is not None or self.modes is not None
 
+    @property
+    @abstractmethod
+    def _is_refused(self) -> bool:
+        """Whether no step can be made from here."""
+
+    def _shorten(self) -> bool:
+        """Whether a shorter step is left to try."""
+        return False
+
     @abstractmethod
     def _aim(self, t: float) -> None:
         """Go on to this end."""
@@ -364,15 +376,16 @@ class EqualStepper(Stepper):
     """Equal steps between the instants, at most dt; unrecorded ones of one length from where they begin to the end."""
 
     stretches: Sequence[EqualSteps] = ()  # in place of those of a span
+    _limit: float = math.inf  # of the next step, after one that could not be made [s]
 
     def _begin(self, t0: float, t_end: float) -> None:
         self._set(t=t0)
-        self._left = 0
+        self._left, self._limit = 0, math.inf
 
     def beside(self, stretches: Sequence[EqualSteps]) -> EqualStepper:
         """The stepper of other stretches, without events."""
         options, modes = replace(self.options, max_steps=math.inf), self.modes and Modes(self.modes.plain)
-        other = EqualStepper(self.compiled, options, self._given, stopped=self.stopped, modes=modes)
+        other = EqualStepper(self._plain, options, self._given, stopped=self.stopped, modes=modes)
         other.stretches = stretches
         return other
 
@@ -380,13 +393,18 @@ class EqualStepper(Stepper):
         instants = span.instants if self.control is None else self.control.instants(span.instants)
         m, most, total = self.program.size, self.options.max_steps, 0
         longest = CROSSED_BLOCK if self.modes is not None else math.inf  # doubled as long as none is crossed
-        for stretch in steps_after(self.stretches or equal_steps(instants, self.options.step), self.t):
+        grid = self.stretches or equal_steps(instants, self.options.step)
+        stretches = steps_after(grid, self.t)
+        if stretches and abs(stretches[0].h) > self._limit:
+            end = self.t + math.copysign(self._limit, stretches[0].h)
+            stretches = [EqualSteps(self.t, end - self.t, 1, end), *steps_after(grid, end)]
+        for stretch in stretches:
             self._enter(stretch)
             if self.control is not None:
                 self._hold(self.control, stretch.end)
             while self._left:
                 if self.steps >= most:
-                    self.status = self._too_many()
+                    self.status, self._limit = self._too_many(), math.inf
                     return
                 before, t_old, x_old = self._memory.copy(), self.t, self.x.copy()
                 longest = min(longest, self._passes) if self._passes == 1 else longest
@@ -405,6 +423,13 @@ class EqualStepper(Stepper):
                     yield StepBlock(t, x, begin, t - begin, starts, None, self.program.normalization)
                 if self.status:
                     return
+
+    @property
+    def _is_refused(self) -> bool:
+        return self._limit < math.inf and bool(self.status)
+
+    def _shorten(self) -> bool:
+        return self._limit > RESOLUTION * abs(self.t)
 
     def _aim(self, t: float) -> None:
         if not self.stretches or self.stretches[-1].end != t:
@@ -435,6 +460,7 @@ class EqualStepper(Stepper):
         names, x = self.program.components, self.runner.read(failed, "x")
         reason = nonfinite(names, x) or unsolved(names, self.x, x)
         self.status = f"stopped at t = {failed[self._at['t']]:.6g} s: {reason}"
+        self._limit = 0.5 * abs(self._stretch.h)
         self._set(evaluations=failed[self._at["evaluations"]])
         return rows
 
@@ -490,6 +516,10 @@ class ChosenStepper(Stepper):
         self.advance(span.t_end)
         self._count_trials()
         return not self.status and self._number("at_limit") < HELD
+
+    @property
+    def _is_refused(self) -> bool:
+        return bool(self._numbers[self._stop] == TOO_SMALL)
 
     def _aim(self, t: float) -> None:
         numbers, at = self._numbers, self._at
