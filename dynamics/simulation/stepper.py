@@ -429,7 +429,9 @@ class EqualStepper(Stepper):
         return self._limit < math.inf and bool(self.status)
 
     def _shorten(self) -> bool:
-        return self._limit > RESOLUTION * abs(self.t)
+        assert self.modes is not None
+        h = math.copysign(2.0 * self._limit, self._stretch.h)
+        return self._limit > RESOLUTION * abs(self.t) and self.modes.nears(self.t, self.x, self._given, h)
 
     def _aim(self, t: float) -> None:
         if not self.stretches or self.stretches[-1].end != t:

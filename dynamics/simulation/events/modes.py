@@ -147,6 +147,13 @@ class Modes:
         normal = _slopes(watched.part(number).values, point[:, 0], len(x))[:-1]
         return number, x - outputs_of(watched.values, point)[number, 0] * normal / (normal @ normal)
 
+    def nears(self, t: float, x: Array, p: Sequence[float], h: float) -> bool:
+        """Whether the motion comes to a surface in two steps of h, by its rate."""
+        point, (watched, _) = self._point(t, x, p, self.values[:, None]), self._watched
+        ways = np.append(outputs_of(self.problem.rate, point)[: len(x), 0], 1.0)[:, None]
+        ahead = outputs_of(watched.values, point) + 2.0 * h * outputs_of(watched.slopes, point, ways)
+        return bool((ahead <= 0.0).any())
+
     @property
     def _watched(self) -> tuple[Quantities, tuple[tuple[int, int], ...]]:
         switches = self.problem.switches

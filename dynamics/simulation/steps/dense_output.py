@@ -137,6 +137,7 @@ def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float], ins
     slopes = block.h[:, None] * _compiled(rate).batch(points).T.reshape(states.shape)
     powers = np.arange(1, 2 * len(shares))
     matrix = np.concatenate([shares[1:, None] ** powers, powers * shares[:, None] ** (powers - 1)])
+    slopes = np.where(np.isfinite(slopes), slopes, block.x - block.x_old)  # beyond a surface a law may have no value
     known = np.concatenate([states[1:] - states[0], slopes])
     dense = np.linalg.solve(matrix, known.reshape(len(powers), -1)).reshape(len(powers), *block.x.shape)
     return block._replace(dense=dense.swapaxes(0, 1))
