@@ -1,4 +1,4 @@
-"""Switches: a rate that jumps or kinks as a smooth one, whose sides of switching surfaces are inputs, its modes.
+"""Rate in modes: one that jumps or kinks as a smooth one, whose sides of switching surfaces are inputs, its modes.
 
 Where g passes zero, sign(g), |g|, a < b, max(a, b) and their kin take another piece. A mode says which side of such a
 surface holds: -1 or 1, or n of a floor. In a slide, of a mode half way between two sides, the rate is mixed from
@@ -132,11 +132,13 @@ class _Reader:
         a, b = args[0], args[-1]
         if name in STEPS:
             sign, offset = {"floor": (1.0, 0.0), "ceil": (-1.0, 0.0), "round": (1.0, 0.5)}[name]
-            return sign * self._mode(sign * a + offset, 1.0)[0]
+            step = self._surface(sign * a + offset, 1.0)
+            return None if step is None else sign * step.mode
         if name == "fmod":
             quotient = a / b
             side = self._side(quotient)
-            return None if side is None else a - b * (side * self._mode(side * quotient, 1.0)[0])
+            step = None if side is None else self._surface(side * quotient, 1.0)
+            return None if side is None or step is None else a - b * (side * step.mode)
         side = self._side(a if len(args) == 1 else a - b, is_sign=name == "sign")
         if side is None:
             return None
@@ -165,20 +167,22 @@ class _Reader:
             return cg.constant(math.copysign(sign, g.value * sign)) if g.value else None
         if _excludes_zero(g):
             return None
-        mode, surface = self._mode(g, 2.0)
+        if (surface := self._surface(g, 2.0)) is None:
+            return None
         surface.is_sign |= is_sign
-        return mode if sign > 0.0 else -mode
+        return surface.mode if sign > 0.0 else -surface.mode
 
-    def _mode(self, g: Node, spacing: float) -> tuple[Node, _Surface]:
+    def _surface(self, g: Node, spacing: float) -> _Surface | None:
+        """The surface of a quantity; None of one that is not among those that are known, if some are."""
         if (g, spacing) not in self._surfaces:
-            if self._known and (mode := self._known.get((self._places.of(g), spacing))) is not None:
-                self._surfaces[g, spacing] = _Surface(mode, g, g if spacing == 2.0 else g - mode, spacing)
-                return mode, self._surfaces[g, spacing]
-            (mode,) = new_variables("mode", 1, self._taken)
-            self._taken.append(str(mode.name))
+            mode = self._known.get((self._places.of(g), spacing)) if self._known else None
+            if mode is None and self._known:
+                return None
+            if mode is None:
+                (mode,) = new_variables("mode", 1, self._taken)
+                self._taken.append(str(mode.name))
             self._surfaces[g, spacing] = _Surface(mode, g, g if spacing == 2.0 else g - mode, spacing)
-        surface = self._surfaces[g, spacing]
-        return surface.mode, surface
+        return self._surfaces[g, spacing]
 
 
 def _excludes_zero(g: Node) -> bool:
@@ -242,7 +246,13 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         lower = {modes[k]: modes[k] - 0.5 * switches.spacing[k] * hold for k, hold in zip(chosen, holds, strict=True)}
     first, *others = [
         folded([*rates, *[gaps[k] for k in chosen]], build, side)
-        for side in (lower, *[lower | {modes[k]: lower[modes[k]] + switches.spacing[k]} for k in chosen])
+        for side in (
+            lower,
+            *[
+                lower | {modes[k]: lower[modes[k]] + switches.spacing[k] * h}
+                for k, h in zip(chosen, holds, strict=True)
+            ],
+        )
     ]
     f, g = first[: len(rates)], first[len(rates) :]
     ways = dict(zip(states, f, strict=False)) | {inputs[m]: cg.constant(1.0)}
