@@ -367,7 +367,7 @@ def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Grap
     result = list[Graph]()
     for k, number in others:
         margin, own = modes.margin(before, number), modes.margin(before, first[1])
-        if _is_same(margin, own, point) or not _is_zero(margin, point, modes.plain.size):
+        if _is_same(margin, own, point) or not _is_zero(margin, point, modes.sizes):
             between[k] = after.modes[k]
             continue
         following = [*between]
@@ -401,10 +401,10 @@ def _slopes(margin: Graph, point: Array, m: int) -> Array:
     return values_of(slopes, point, 1)[:, 0]
 
 
-def _is_zero(margin: Graph, point: Array, m: int) -> bool:
+def _is_zero(margin: Graph, point: Array, sizes: Array) -> bool:
     """Whether a margin is zero there, and not turned by the mode of an earlier one on which it depends."""
-    value = values_of(margin, point, 1)[0, 0]
-    return bool(abs(value) <= ALIKE * (np.abs(_slopes(margin, point, m)) @ np.abs(point[: m + 1])))
+    m, value = len(sizes), values_of(margin, point, 1)[0, 0]
+    return bool(abs(value) <= ALIKE * (np.abs(_slopes(margin, point, m)) @ np.append(sizes, abs(point[m]))))
 
 
 def _is_same(a: Graph, b: Graph, point: Array) -> bool:
