@@ -276,7 +276,7 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
             for i in range(len(chosen))
         ]
         rights = [[cg.where(h, -value, 0.0) for h, value in zip(holds, part, strict=True)] for part in (drift, g)]
-        shares, moves = _solved(matrix, rights)
+        shares, moves = _solved(matrix, rights, (0.5, 0.0))
         rate = [_mixed(each, shares, [jump[i] for jump in jumps]) for i, each in enumerate(f)]
         onto = [_mixed(each, moves, [jump[i] for jump in jumps]) for i, each in enumerate(states)]
         surfaces = list(switches.surfaces.outputs.values())
@@ -284,20 +284,13 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
             if surface in states:  # a state that stays zero does so exactly
                 i = states.index(surface)
                 rate[i], onto[i] = cg.where(hold, 0.0, rate[i]), cg.where(hold, 0.0, onto[i])
-        margins, turns = list[Node](), list[tuple[int, int]]()
-        place = {k: (hold, share) for k, hold, share in zip(chosen, holds, shares, strict=True)}
-        for (k, way), margin in zip(switches.turns, switches.margins.outputs.values(), strict=True):
-            if k not in place:
-                margins.append(margin)
-                turns.append((k, way))
-                continue
-            hold, share = place[k]
-            for side, inside in ((-1, share), (1, 1.0 - share)):
-                if way in (0, side):
-                    own = margin if way or side < 0 else cg.constant(1.0)
-                    margins.append(cg.where(hold, inside, own))
-                    turns.append((k, side))
-    made = replace(switches, margins=_numbered(inputs, margins), turns=tuple(turns))
+        place = dict(zip(chosen, holds, strict=True))
+        turns, margins = list(switches.turns), list(switches.margins.outputs.values())
+        margins = [cg.where(place[k], 1.0, g) if k in place else g for (k, _), g in zip(turns, margins, strict=True)]
+        for k, hold, share in zip(chosen, holds, shares, strict=True):
+            margins += [cg.where(hold, share, 1.0), cg.where(hold, 1.0 - share, 1.0)]
+            turns += [(k, -1), (k, 1)]
+    made = replace(switches, margins=_numbered(inputs, margins), turns=tuple(turns), ends=2 * len(chosen))
     project = _numbered(inputs, onto)
     if problem.projection is not None:
         nodes = list(problem.projection.outputs.values())
@@ -326,12 +319,15 @@ def _mixed(start: Node, shares: Sequence[Node], jumps: Sequence[Node]) -> Node:
     return start
 
 
-def _solved(matrix: list[list[Node]], rights: list[list[Node]]) -> list[list[Node]]:
-    """The solutions of A w = b for several b, by elimination in the order as it is."""
+def _solved(matrix: list[list[Node]], rights: list[list[Node]], without: Sequence[float]) -> list[list[Node]]:
+    """The solutions of A w = b for several b, by elimination in the order as it is; `without` a pivot these numbers."""
     n = len(matrix)
+    none, pivots = list[Node](), list[Node]()
     for k in range(n):
+        none.append(cg.equal(matrix[k][k], 0.0))
+        pivots.append(cg.where(none[k], 1.0, matrix[k][k]))
         for i in range(k + 1, n):
-            factor = matrix[i][k] / matrix[k][k]
+            factor = matrix[i][k] / pivots[k]
             if factor.value == 0.0:
                 continue
             matrix[i] = [
@@ -340,9 +336,9 @@ def _solved(matrix: list[list[Node]], rights: list[list[Node]]) -> list[list[Nod
             ]
             for right in rights:
                 right[i] = right[i] - factor * right[k]
-    for right in rights:
+    for right, number in zip(rights, without, strict=True):
         for k in reversed(range(n)):
             for j in range(k + 1, n):
                 right[k] = right[k] - matrix[k][j] * right[j]
-            right[k] = right[k] / matrix[k][k]
+            right[k] = cg.where(none[k], number, right[k] / pivots[k])
     return rights

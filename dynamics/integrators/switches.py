@@ -26,6 +26,7 @@ class Switches:
     margins: Graph  # positive where the modes hold
     turns: tuple[tuple[int, int], ...]  # of each margin, the mode that turns where it is zero, and whether up or down
     called: Mapping[str, str]  # {name of an input: what a person calls it}
+    ends: int = 0  # of the last margins, how many are of shares of slides, each 1 where its surface is not slid on
 
     @cached_property
     def sides(self) -> list[Node]:

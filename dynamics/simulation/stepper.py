@@ -23,7 +23,7 @@ from .events.event import EventProgram
 from .events.event_log import EventLog
 from .events.modes import Modes
 from .run_options import Span, Steps
-from .steps.dense_output import StepBlock, inside_nodes, with_hermite
+from .steps.dense_output import Indices, StepBlock, inside_nodes, with_hermite
 from .steps.equal_steps import EqualSteps, equal_steps, steps_after
 from .steps.first_step import START, TOLERANCE, start_registers
 from .steps.flat_position import CREEP, FlatPosition
@@ -34,6 +34,9 @@ BLOCK_TIME = 0.1  # s of run time after which a run comes back to Python: for Ct
 TINY = np.finfo(float).tiny
 CROSSED_BLOCK, LONGEST_BLOCK = 64, 4096  # equal steps between two looks for crossings, at first and at most
 FIRST_PASSES = 32  # of the first block, before it is known how long one takes
+NEARLY = 0.99  # of a step, from where on it is cut for sure
+AGAIN = 8  # times that a step is made shorter for it
+OFF = 10.0  # tolerances, by which a step may be off where it is cut
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 COUNTED = "steps", "rejected", "evaluations", "jacobians", "factorizations"
 END, GOAL, FIRST, WISH = [f"{START}{name}" for name in ("t_end", "goal", "first", "wish")]  # registers
@@ -61,7 +64,7 @@ class Stepper(ABC):
     every_step: bool = False  # whether all are in blocks, also where rows and checks need the last of a block alone
 
     def __post_init__(self) -> None:
-        self._passes, self._given, self._wish = FIRST_PASSES, list(self.parameters), 0.0
+        self._passes, self._given, self._wish, self._again = FIRST_PASSES, list(self.parameters), 0.0, 0
         self._plain, self._pending = self.compiled, list[tuple[int, float, Array, float]]()
         self._load(self.compiled)
         if self.control is None:
@@ -137,8 +140,9 @@ class Stepper(ABC):
         number, t, x, h = self._pending.pop()
         sizes = self.modes.sizes
         self._before = {name: getattr(self, name) for name in COUNTED}
-        self.modes.turn(t, x, self._given, number)
-        x = self._enter_modes(t, x)
+        if number >= 0:
+            self.modes.turn(t, x, self._given, number)
+            x = self._enter_modes(t, x)
         self._numbers[:], self.status = self._zero, self.modes.failed
         self.x[:] = x
         self._wish = abs(h)
@@ -229,6 +233,12 @@ class Stepper(ABC):
             if crossing is not None:
                 row, at = crossing.row, (np.array([crossing.row]), np.array([crossing.s]))
                 t, x = float(part.times_at(*at)[0]), part.states_at(*at)[0]
+                if self._again < AGAIN and self._is_off(part, at, t, x):
+                    self.modes.look_again(row)
+                    self._again += 1
+                    self._pending = [(-1, float(part.t_old[row]), part.x_old[row], crossing.s * float(part.h[row]))]
+                    return [part.part(slice(row))], crossing
+                self._again = 0
                 self._pending = [(crossing.number, t, x, float(part.h[row]))] if t != t_end else []
                 self.modes.see(x)
                 moves = t != part.t_old[row]
@@ -237,6 +247,16 @@ class Stepper(ABC):
                 return [*[block.part(slice(first))][: first > 0], last.ending(t, x) if moves else last], crossing
         self.modes.see(block.x)
         return [block], None
+
+    def _is_off(self, part: StepBlock, at: tuple[Indices, Array], t: float, x: Array) -> bool:
+        """Whether the motion of a step that goes on beyond a surface is off there, as where a law is sharp."""
+        row, begin = at[0][0], part.x_old[at[0][0]]
+        if not self.program.adaptive or part.t_old[row] == t or at[1][0] > NEARLY:
+            return False
+        rate = outputs_of(self.program.rate, np.append(x, t)[:, None], np.array(self.parameters))[: len(x), 0]
+        off = np.abs(part.slopes_at(*at)[0] - float(part.h[row]) * rate)
+        scale = self.runner.read(self._memory, TOLERANCE) + self._relative * np.fmax(np.abs(x), np.abs(begin))
+        return not bool((off <= OFF * scale).all())
 
     def go(self, t: float, *, single: bool = False) -> None:
         """Go on to t, or by a single step, across surfaces."""

@@ -2,7 +2,8 @@
 
 On a cell, a part of a step, states lie in the hull of the Bernstein coefficients of the dense output, and interval
 arithmetic bounds quantities and their slopes along the motion. A cell is clear of zeros, or a quantity goes one way in
-it, or it is halved.
+it, or it is halved. Of quantities as smooth as the rate, which steps resolve, bounds are those of the control points of
+polynomials through values.
 """
 
 from __future__ import annotations
@@ -25,11 +26,14 @@ from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.state_sizes import Flags
 
 MOST_CELLS = 4096  # that wait at once
+MOST_NUMBERS = 2**22  # of operations on the cells that wait, or on points that are looked at together
+FITTED = 8  # degree of polynomials through values
 SHORTEST = 2.0**-50  # of a step, a cell
 LEFT = 1e-3  # of the largest that a quantity is in a step, by which it has left zero
 PARTS = 32  # of the first step, at whose ends a quantity that begins at zero is looked at
 DEGREES = 8  # of dense output, whose matrices are kept
 OFTEN = 200  # calls of a graph, which take about as long as to compile it
+ALIKE = 256  # points, that take about as long as a call
 
 
 class Crossing(NamedTuple):
@@ -46,6 +50,19 @@ class Quantities:
 
     values: Graph
     size: int
+    resolved: int = 0  # of the last ones, how many are as smooth as the rate
+
+    @cached_property
+    def bounded(self) -> Quantities:
+        """The others."""
+        outputs = list(self.values.outputs.items())
+        return Quantities(Graph(self.values.inputs, dict(outputs[: len(outputs) - self.resolved])), self.size)
+
+    @cached_property
+    def fitted(self) -> Graph:
+        """Those that are as smooth as the rate."""
+        outputs = list(self.values.outputs.items())
+        return Graph(self.values.inputs, dict(outputs[len(outputs) - self.resolved :]))
 
     @cached_property
     def slopes(self) -> Graph:
@@ -79,15 +96,16 @@ class Quantities:
 
 
 @kept_by_first
-def quantities(graph: Graph, m: int) -> Quantities:
+def quantities(graph: Graph, m: int, resolved: int = 0) -> Quantities:
     """The quantities of a graph over m states, t and parameters."""
-    return Quantities(graph, m)
+    return Quantities(graph, m, resolved)
 
 
 @kept_by_first
 def _part(watched: Quantities, number: int) -> Quantities:
     name, node = list(watched.values.outputs.items())[number]
-    return Quantities(Graph(watched.values.inputs, {name: node}), watched.size)
+    is_resolved = number >= len(watched.values.outputs) - watched.resolved
+    return Quantities(Graph(watched.values.inputs, {name: node}), watched.size, int(is_resolved))
 
 
 class _Batch:
@@ -99,14 +117,16 @@ class _Batch:
 
     def __call__(self, points: Array) -> Array:
         """The outputs."""
-        self._calls += 1
-        if self._calls == OFTEN:
+        self._calls += 1 + points.shape[1] // ALIKE
+        if self._calls >= OFTEN and self._function is None:
             self._function = cg.compile(self._graph).batch
         if self._function is not None:
             return self._function(points)
-        result = np.empty((len(self._graph.outputs), points.shape[1]))
-        for row, value in zip(result, _operations(self._graph, numbers=False)(points), strict=True):
-            row[:] = value
+        result, values = np.empty((len(self._graph.outputs), points.shape[1])), _operations(self._graph, numbers=False)
+        together = max(1, MOST_NUMBERS // len(self._graph.nodes))
+        for first in range(0, points.shape[1], together):
+            for row, value in zip(result, values(points[:, first : first + together]), strict=True):
+                row[first : first + together] = value
         return result
 
 
@@ -178,6 +198,7 @@ def _first_zero(
     before: another crossing, after which nothing counts.
     """
     best, b = None if before is None else before[:2], np.ones(len(rows))
+    most = max(64, min(MOST_CELLS, MOST_NUMBERS // len(one.values.nodes)))
     found: tuple[int, float] | None = None
     while len(rows):
         begins, ends = np.split(_values(one, p, block, np.tile(rows, 2), np.concatenate([a, b]))[0], 2)
@@ -197,7 +218,7 @@ def _first_zero(
         rows, a, b = rows[split], a[split], b[split]
         middle = 0.5 * (a + b)
         rows, a, b = np.tile(rows, 2), np.concatenate([a, middle]), np.concatenate([middle, b])
-        if len(rows) > MOST_CELLS:
+        if len(rows) > most:
             return found, False
     return found, True
 
@@ -231,8 +252,8 @@ def _left_at(one: Quantities, p: Array, block: StepBlock, rounding: float) -> fl
     """The share of the first step from which a quantity that begins at zero is looked at; 1 if it stays on its side."""
     if math.isnan(rounding):
         return 0.0
-    s = np.linspace(0.0, 1.0, PARTS + 1)
-    values = _values(one, p, block, np.zeros(len(s), dtype=np.intp), s)[0]
+    s = np.linspace(0.0, 1.0, PARTS + 1)[1:]
+    values = _values(one, p, block, np.zeros(PARTS, dtype=np.intp), s)[0]
     size = np.abs(values).max()
     if not size > rounding:
         return 1.0
@@ -321,8 +342,29 @@ def _ends(points: Array) -> tuple[Array, Array]:
     return points.min(axis=1).T, points.max(axis=1).T
 
 
+@memo(1)
+def _interpolation() -> tuple[Array, Array]:
+    """Shares of a cell, its ends with them, and the matrix from values there to Bernstein coefficients."""
+    s = 0.5 - 0.5 * np.cos(np.pi * np.arange(FITTED + 1) / FITTED)
+    choose = _binomials(FITTED)[0][:, -1]
+    k = np.arange(FITTED + 1)
+    return s, np.asarray(np.linalg.inv(choose * s[:, None] ** k * (1.0 - s[:, None]) ** (FITTED - k)))
+
+
+def _fitted_points(graph: Graph, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array) -> Array:
+    """Control points (k, n, degree + 1) of polynomials through the values of quantities on cells."""
+    shares, matrix = _interpolation()
+    s, each = (a[:, None] + (b - a)[:, None] * shares).reshape(-1), np.repeat(rows, len(shares))
+    values = outputs_of(graph, block.polynomials_at(each, s).T, block.times_at(each, s)[None], p)
+    return np.asarray(values.reshape(-1, len(rows), len(shares)) @ matrix.T)
+
+
 def _bounds(watched: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:
     """Lower and upper bounds of quantities on cells, (k, n)."""
+    if watched.resolved:
+        bounded = _bounds(watched.bounded, p, block, rows, a, b)
+        fitted = _fitted_points(watched.fitted, p, block, rows, a, b)
+        return np.vstack([bounded[0], fitted.min(axis=2)]), np.vstack([bounded[1], fitted.max(axis=2)])
     points, affine = _state_points(block, rows, a, b), np.array(watched.affine)
     low, high = np.empty((2, len(affine), len(rows)))
     if affine.any():
@@ -338,6 +380,9 @@ def _slope_bounds(
     one: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array
 ) -> tuple[Array, Array]:
     """Lower and upper bounds of the slope of one quantity by the share of the step on cells, (n,)."""
+    if one.resolved:
+        ways = FITTED * np.diff(_fitted_points(one.values, p, block, rows, a, b)[0], axis=1) / (b - a)[:, None]
+        return ways.min(axis=1), ways.max(axis=1)
     points, slopes = _state_points(block, rows, a, b), _slope_points(block, rows, a, b)
     if one.affine[0]:
         at = np.repeat(points[:, :1], slopes.shape[1], axis=1).reshape(-1, points.shape[2]).T

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -24,7 +25,8 @@ from .crossing_search import Crossing, Quantities, first_crossing, outputs_of, q
 from .event import rounding_errors
 
 AT_ONCE = 1e-11  # of the sizes of the states so far: by so much surfaces may be off that are met at one instant
-SHARE = RESTS = 1e-9  # of a slide, and of a second derivative, which is rounding
+SHARE = 1e-9  # of a slide, which is rounding
+LATER, AHEAD = 3, 1e-6  # of the sizes of states, by which motions go on that are looked at later
 FEW = 5  # surfaces at an instant, of which all combinations are tried
 ROUNDS = 50  # of pivots for each of more
 STUCK = 20  # turns at one instant, besides three of each surface
@@ -74,7 +76,7 @@ class Modes:
         self._signs = frozenset(np.flatnonzero(self._switches.signs).tolist())
         self._among = self._signs
         self.sizes = np.zeros(problem.size)
-        self._fresh = np.full(len(self.values), np.nan)
+        self._fresh = self._left = np.full(len(self.values), np.nan)
         self._at = (np.nan, 0)  # the instant of the last turn, and how many there were at it
 
     @property
@@ -112,12 +114,19 @@ class Modes:
         watched, turns = self._watched
         fresh = np.where(self.slid & ~np.isnan(self._fresh), SHARE, self._fresh)[[k for k, _ in turns]]
         found = first_crossing(watched, np.array([*p, *self.values]), block, fresh)
-        self._fresh[:] = np.nan
+        self._left, self._fresh = self._fresh, np.full(len(self.values), np.nan)
         return found
+
+    def look_again(self, row: int) -> None:
+        """The step of a crossing, of the block that was looked at last, is not made: another begins there."""
+        self._fresh = self._fresh if row else self._left
 
     def doubtful(self, block: StepBlock, p: Sequence[float]) -> list[int]:
         """Steps in which a surface may be crossed."""
-        return steps_near_zero(self._watched[0], np.array([*p, *self.values]), block)
+        found = steps_near_zero(self._watched[0], np.array([*p, *self.values]), block)
+        if found[:1] != [0]:
+            self._fresh[:] = np.nan
+        return found
 
     def turn(self, t: float, x: Array, p: Sequence[float], number: int) -> None:
         """Turn the mode of a margin that is zero at this state, and what else is due there."""
@@ -158,7 +167,7 @@ class Modes:
     def _watched(self) -> tuple[Quantities, tuple[tuple[int, int], ...]]:
         switches = self.problem.switches
         assert isinstance(switches, Switches)
-        return quantities(switches.margins, self.plain.size), switches.turns
+        return quantities(switches.margins, self.plain.size, switches.ends), switches.turns
 
     def _point(self, t: float, x: Array, p: Sequence[float], modes: Array) -> Array:
         """Inputs (.., N) of a graph at modes (k, N)."""
@@ -219,10 +228,12 @@ class Modes:
         """The modes that change between two turns, and the margins that are zero there, that which was found first."""
         switches = before.of(self.plain).switches
         assert switches is not None
-        found = [(switches.turns[after.number][0], after.number)]
+        found, first_end = [(switches.turns[after.number][0], after.number)], len(switches.turns) - switches.ends
+        slid = self._slid(before.modes)
         for k, (one, two) in enumerate(zip(before.modes, after.modes, strict=True)):
             if one != two and k != found[0][0]:
-                ways = [n for n, (j, way) in enumerate(switches.turns) if j == k and way * (two - one) >= 0.0]
+                of_end = range(len(switches.turns))[slice(first_end, None) if slid[k] else slice(first_end)]
+                ways = [n for n in of_end if switches.turns[n][0] == k and switches.turns[n][1] * (two - one) >= 0.0]
                 found.append((k, ways[0]))
         return found
 
@@ -248,7 +259,7 @@ class _Choice:
     ) -> None:
         self._of, self._t, self._x, self._p = of, t, x, p
         self._among, self._middle, self._half, self._crossed = among, middle, half, crossed
-        self._known: dict[tuple[int, ...], tuple[Array, Array]] = {}
+        self._known: dict[tuple[int, ...], tuple[Array, Array]] = {}  # by order, and sides
 
     def found(self) -> Array | None:
         """Modes that hold; None if none do."""
@@ -277,40 +288,50 @@ class _Choice:
         modes[self._among] = self._modes(sides)
         return modes
 
-    def _drifts(self, sides: Sequence[int]) -> tuple[Array, Array]:
-        """How the gaps move with these sides, none of which is 0, and what of it is rounding, (n,) each.
+    def _derivatives(self, order: int, sides: Sequence[int]) -> tuple[Array, Array]:
+        """Derivatives of the gaps by time with these sides, none of which is 0, and what of it is rounding, (n,) each.
 
-        Gaps that rest with any sides, as of a position at rest, by their second derivatives.
+        Of order 1 or 2; 3 stands for the first ones a little later.
         """
-        key = tuple(sides)
+        key = order, *sides
         if key not in self._known:
-            ways = np.array([[0.0] * len(self._x), *_signs(len(self._x))]).T
-            states = self._x[:, None] + AT_ONCE * self._of.sizes[:, None] * ways
-            fixed = np.concatenate([[self._t], self._p, self._modes_at(sides)])[:, None]
+            t, x, sizes = self._t, self._x, self._of.sizes
+            fixed = np.array([*self._p, *self._modes_at(sides)])
+            if order == LATER:
+                rate = outputs_of(self._of.plain.rate, np.concatenate([x, [t], fixed])[:, None])[: len(x), 0]
+                moves = (sizes > 0.0) & (rate != 0.0)
+                after = self._of.direction * AHEAD * np.min(sizes[moves] / np.abs(rate[moves]), initial=math.inf)
+                x, t = (x + after * rate, t + after) if math.isfinite(after) else (x, t)
+            ways = np.array([[0.0] * len(x), *_signs(len(x))]).T
+            states = x[:, None] + AT_ONCE * sizes[:, None] * ways
+            fixed = np.concatenate([[t], fixed])[:, None]
             points = np.concatenate([states, np.broadcast_to(fixed, (len(fixed), ways.shape[1]))])
-            values = self._of.direction * outputs_of(_drift(self._of.plain, 1), points)[self._among]
+            values = outputs_of(_drift(self._of.plain, 2 if order == 2 else 1), points)[self._among]
+            values *= 1.0 if order == 2 else self._of.direction
             off = 4.0 * np.abs(values[:, 1:] - values[:, :1]).max(axis=1) + 16.0 * UNIT * np.abs(values[:, 0])
             self._known[key] = values[:, 0], off
         return self._known[key]
 
     @cached_property
-    def _rests(self) -> Flags:
-        """Whether each gap rests on both sides of all surfaces."""
-        n = len(self._among)
-        found = [self._drifts([side] * n) for side in (-1, 1)]
-        return np.logical_and(*[np.abs(drift) <= off for drift, off in found])
+    def _rests(self) -> list[Flags]:
+        """Whether the first derivative of each gap, and also the second, is zero on both sides of all surfaces."""
+        n, result = len(self._among), list[Flags]()
+        for order in (1, 2):
+            found = [self._derivatives(order, [side] * n) for side in (-1, 1)]
+            result.append(np.logical_and.reduce([*result, *[np.abs(value) <= off for value, off in found]]))
+            if not result[0].any():
+                break
+        return result
 
     def _motions(self, sides: Sequence[int]) -> tuple[Array, Array]:
-        """The first derivatives of the gaps, or of those that rest the second ones, and what of them is rounding."""
-        drift, off = self._drifts(sides)
-        if not self._rests.any():
-            return drift, off
-        second = self._second(sides)
-        return np.where(self._rests, second, drift), np.where(self._rests, RESTS * np.abs(second), off)
-
-    def _second(self, sides: Sequence[int]) -> Array:
-        point = self._of._point(self._t, self._x, self._p, self._modes_at(sides)[:, None])
-        return np.asarray(outputs_of(_drift(self._of.plain, 2), point)[self._among, 0])
+        """The first derivatives of the gaps that are not zero on all sides, and what of them is rounding."""
+        value, off = self._derivatives(1, sides)
+        for order, rests in enumerate(self._rests, 2):
+            if rests.any():
+                value, off = [
+                    np.where(rests, *parts) for parts in zip(self._derivatives(order, sides), (value, off), strict=True)
+                ]
+        return value, off
 
     def _wrong(self, sides: Sequence[int]) -> list[tuple[int, int]]:
         """Surfaces that do not let the motion go on with these sides, and where they send it."""
@@ -326,15 +347,15 @@ class _Choice:
                 left = np.abs(drift[slides] + matrix[slides] @ shares)
             for i, k in enumerate(slides):
                 size = abs(columns[i][k])
-                if not columns[i][k] < -off[k] or not left[i] <= RESTS * size:
+                if not columns[i][k] < -off[k] or not left[i] <= SHARE * size:
                     wrong.append((k, 1 if drift[k] > 0.0 else -1))
-                elif not -RESTS <= shares[i] <= 1.0 + RESTS:
+                elif not -SHARE <= shares[i] <= 1.0 + SHARE:
                     wrong.append((k, 1 if shares[i] > 0.5 else -1))
             drift = drift + matrix @ shares
         for k, side in enumerate(sides):
             if side and not side * drift[k] > off[k]:
                 leaves = side * drift[k] < -off[k]
-                if leaves or (not (slides or self._rests[k]) and side * self._second(sides)[k] < 0.0):
+                if leaves or (not (slides or self._rests[0][k]) and side * self._derivatives(2, sides)[0][k] < 0.0):
                     wrong.append((k, -side))
         return wrong
 
