@@ -315,6 +315,8 @@ def _control_points(coefficients: Array, a: Array, b: Array) -> Array:
     """Bernstein coefficients (n, degree + 1, m) of polynomials (n, degree + 1, m) on [a, b] (n,)."""
     degree = coefficients.shape[1] - 1
     choose, matrix = _binomials(degree)
+    if not a.any() and (b == 1.0).all():
+        return np.asarray(matrix @ coefficients)
     i, k = np.indices(choose.shape)
     parts = choose * a[:, None, None] ** np.maximum(k - i, 0) * (b - a)[:, None, None] ** i
     return np.asarray(matrix @ np.where(k >= i, parts, 0.0) @ coefficients)

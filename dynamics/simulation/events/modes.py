@@ -147,7 +147,7 @@ class Modes:
     def touched(self, t: float, x: Array, p: Sequence[float]) -> tuple[int, Array] | None:
         """The margin that is zero to rounding at a state, if one is: what a step does not pass; and the state on it."""
         errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))[:, None]
-        point, (watched, turns) = self._point(t, x, p, self.values[:, None]), self._watched
+        point, (watched, turns) = _points(t, x, p, self.values[:, None]), self._watched
         allowed = outputs_of(_gap_errors(self.plain), np.concatenate([point, errors]))[[k for k, _ in turns], 0]
         near = np.abs(outputs_of(watched.values, point)[:, 0]) <= allowed
         if not near.any() or self.slid.any():
@@ -158,7 +158,7 @@ class Modes:
 
     def nears(self, t: float, x: Array, p: Sequence[float], h: float) -> bool:
         """Whether the motion comes to a surface in two steps of h, by its rate."""
-        point, (watched, _) = self._point(t, x, p, self.values[:, None]), self._watched
+        point, (watched, _) = _points(t, x, p, self.values[:, None]), self._watched
         ways = np.append(outputs_of(self.problem.rate, point)[: len(x), 0], 1.0)[:, None]
         ahead = outputs_of(watched.values, point) + 2.0 * h * outputs_of(watched.slopes, point, ways)
         return bool((ahead <= 0.0).any())
@@ -169,13 +169,8 @@ class Modes:
         assert isinstance(switches, Switches)
         return quantities(switches.margins, self.plain.size, switches.ends), switches.turns
 
-    def _point(self, t: float, x: Array, p: Sequence[float], modes: Array) -> Array:
-        """Inputs (.., N) of a graph at modes (k, N)."""
-        fixed = np.concatenate([x, [t], p])[:, None]
-        return np.concatenate([np.broadcast_to(fixed, (len(fixed), modes.shape[1])), modes])
-
     def _gaps(self, t: float, x: Array, p: Sequence[float]) -> Array:
-        return outputs_of(self._switches.gaps, self._point(t, x, p, self.values[:, None]))[:, 0]
+        return outputs_of(self._switches.gaps, _points(t, x, p, self.values[:, None]))[:, 0]
 
     def _decide(self, t: float, x: Array, p: Sequence[float], crossed: Array, number: int = -1) -> None:
         """What holds from here on, of the surfaces at zero; crossed: those of which the mode has turned."""
@@ -183,7 +178,7 @@ class Modes:
         errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))
         for _ in range(len(self.values) + 1):  # a mode that has turned may move the surfaces of later ones
             gaps = self._gaps(t, x, p)
-            point = np.append(self._point(t, x, p, self.values[:, None])[:, 0], errors)
+            point = np.append(_points(t, x, p, self.values[:, None])[:, 0], errors)
             allowed = outputs_of(_gap_errors(self.plain), point[:, None])[:, 0]
             moved = ~(slid | floors | crossed) & (self.values * gaps < -allowed)
             self.values = np.where(moved, -self.values, self.values)
@@ -206,7 +201,8 @@ class Modes:
             middle = np.where(down, self.values[among] + half, middle)
             found = _Choice(self, t, x, p, among, middle, half, crossed[among]).found()
             if found is None:
-                self.failed = f"stopped at t = {t:.6g} s: no sides of the surfaces there let the motion go on"
+                names = ", ".join([repr(word) for word in dict.fromkeys([self.words[k] for k in among])])
+                self.failed = f"stopped at t = {t:.6g} s: no sides of the surfaces there let the motion go on: {names}"
                 return
             self.values = self.values.copy()
             self.values[among] = found
@@ -369,6 +365,12 @@ class _Choice:
             k, way = min(wrong)
             sides[k] = way if sides[k] == 0 else 0
         return None
+
+
+def _points(t: float, x: Array, p: Sequence[float], modes: Array) -> Array:
+    """Inputs (.., N) of a graph at modes (k, N)."""
+    fixed = np.concatenate([x, [t], p])[:, None]
+    return np.concatenate([np.broadcast_to(fixed, (len(fixed), modes.shape[1])), modes])
 
 
 def _signs(m: int) -> list[list[float]]:
