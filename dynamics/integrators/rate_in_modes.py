@@ -26,6 +26,7 @@ from .switches import Switches
 COMPARED = {"less", "less_equal"}
 KINKS = {"abs", "minimum", "maximum"}
 STEPS = {"floor", "ceil", "round"}
+TINY = 1e-290  # taken from a pivot, that may be zero where a force begins: shares of such are lost in any case
 SWITCHED = {"sign", "fmod", *COMPARED, *KINKS, *STEPS}
 
 
@@ -276,7 +277,7 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
             for i in range(len(chosen))
         ]
         rights = [[cg.where(h, -value, 0.0) for h, value in zip(holds, part, strict=True)] for part in (drift, g)]
-        shares, moves = _solved(matrix, rights, (0.5, 0.0))
+        shares, moves = _solved(matrix, rights)
         rate = [_mixed(each, shares, [jump[i] for jump in jumps]) for i, each in enumerate(f)]
         onto = [_mixed(each, moves, [jump[i] for jump in jumps]) for i, each in enumerate(states)]
         surfaces = list(switches.surfaces.outputs.values())
@@ -319,13 +320,11 @@ def _mixed(start: Node, shares: Sequence[Node], jumps: Sequence[Node]) -> Node:
     return start
 
 
-def _solved(matrix: list[list[Node]], rights: list[list[Node]], without: Sequence[float]) -> list[list[Node]]:
-    """The solutions of A w = b for several b, by elimination in the order as it is; `without` a pivot these numbers."""
-    n = len(matrix)
-    none, pivots = list[Node](), list[Node]()
+def _solved(matrix: list[list[Node]], rights: list[list[Node]]) -> list[list[Node]]:
+    """The solutions of A w = b for several b, by elimination in the order as it is, of pivots below zero or at zero."""
+    n, pivots = len(matrix), list[Node]()
     for k in range(n):
-        none.append(cg.equal(matrix[k][k], 0.0))
-        pivots.append(cg.where(none[k], 1.0, matrix[k][k]))
+        pivots.append(matrix[k][k] - TINY)
         for i in range(k + 1, n):
             factor = matrix[i][k] / pivots[k]
             if factor.value == 0.0:
@@ -336,9 +335,9 @@ def _solved(matrix: list[list[Node]], rights: list[list[Node]], without: Sequenc
             ]
             for right in rights:
                 right[i] = right[i] - factor * right[k]
-    for right, number in zip(rights, without, strict=True):
+    for right in rights:
         for k in reversed(range(n)):
             for j in range(k + 1, n):
                 right[k] = right[k] - matrix[k][j] * right[j]
-            right[k] = cg.where(none[k], number, right[k] / pivots[k])
+            right[k] = right[k] / pivots[k]
     return rights

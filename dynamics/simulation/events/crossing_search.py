@@ -26,9 +26,9 @@ from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.state_sizes import Flags
 
 MOST_CELLS = 4096  # that wait at once
-MOST_NUMBERS = 2**22  # of operations on the cells that wait, or on points that are looked at together
+MOST_NUMBERS = 2**19  # of operations on the cells that wait, or on points that are looked at together
 FITTED = 8  # degree of polynomials through values
-SHORTEST = 2.0**-50  # of a step, a cell
+SHORTEST, FINE = 2.0**-50, 2.0**-12  # of a step, a cell; and one of what the step resolves, but for rounding
 LEFT = 1e-3  # of the largest that a quantity is in a step, by which it has left zero
 PARTS = 32  # of the first step, at whose ends a quantity that begins at zero is looked at
 DEGREES = 8  # of dense output, whose matrices are kept
@@ -123,7 +123,7 @@ class _Batch:
         if self._function is not None:
             return self._function(points)
         result, values = np.empty((len(self._graph.outputs), points.shape[1])), _operations(self._graph, numbers=False)
-        together = max(1, MOST_NUMBERS // len(self._graph.nodes))
+        together = max(1, 8 * MOST_NUMBERS // len(self._graph.nodes))
         for first in range(0, points.shape[1], together):
             for row, value in zip(result, values(points[:, first : first + together]), strict=True):
                 row[first : first + together] = value
@@ -203,7 +203,7 @@ def _first_zero(
     while len(rows):
         begins, ends = np.split(_values(one, p, block, np.tile(rows, 2), np.concatenate([a, b]))[0], 2)
         clear, goes_one_way, _ = told_by_slopes(one, p, block, (rows, a, b), begins, ends)
-        told = clear | goes_one_way | (b - a <= SHORTEST)
+        told = clear | goes_one_way | (b - a <= (FINE if one.resolved else SHORTEST))
         passes = np.flatnonzero(told & ((begins < 0.0) | (ends < 0.0)))
         for k in passes[np.lexsort((a[passes], rows[passes]))].tolist():
             row, at = int(rows[k]), float(a[k])

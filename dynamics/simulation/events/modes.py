@@ -342,10 +342,10 @@ class _Choice:
                 shares = np.linalg.lstsq(matrix[slides], -drift[slides], rcond=None)[0]
                 left = np.abs(drift[slides] + matrix[slides] @ shares)
             for i, k in enumerate(slides):
-                size = abs(columns[i][k])
-                if not columns[i][k] < -off[k] or not left[i] <= SHARE * size:
+                size = -columns[i][k]
+                if not size > off[k] or not left[i] <= SHARE * size + off[k]:
                     wrong.append((k, 1 if drift[k] > 0.0 else -1))
-                elif not -SHARE <= shares[i] <= 1.0 + SHARE:
+                elif not -(SHARE + off[k] / size) <= shares[i] <= 1.0 + SHARE + off[k] / size:
                     wrong.append((k, 1 if shares[i] > 0.5 else -1))
             drift = drift + matrix @ shares
         for k, side in enumerate(sides):
