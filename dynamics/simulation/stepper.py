@@ -244,7 +244,10 @@ class Stepper(ABC):
                 moves = t != part.t_old[row]
                 last = part.part(slice(row + moves))
                 first = int(np.flatnonzero(block.t_old == part.t_old[0])[0])
-                return [*[block.part(slice(first))][: first > 0], last.ending(t, x) if moves else last], crossing
+                return [
+                    *[block.part(slice(first))][: first > 0],
+                    last.shortened(crossing.s, t, x) if moves else last,
+                ], crossing
         self.modes.see(block.x)
         return [block], None
 

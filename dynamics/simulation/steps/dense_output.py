@@ -107,6 +107,14 @@ class StepBlock(NamedTuple):
         cut.t[-1:], cut.x[-1:] = t, x
         return cut
 
+    def shortened(self, s: float, t: float, x: Array) -> StepBlock:
+        """The same at the share s of the last step, which is then a step of its own."""
+        assert self.dense is not None
+        cut = self.ending(t, x)._replace(h=self.h.copy(), dense=self.dense.copy())
+        cut.h[-1:] *= s
+        cut.dense[-1:] *= s ** np.arange(1.0, self.dense.shape[1] + 1.0)[:, None]  # type: ignore[index]
+        return cut
+
 
 @kept_by_first
 def _tangent(graph: Graph, m: int) -> Graph:

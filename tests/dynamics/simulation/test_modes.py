@@ -140,3 +140,27 @@ def test_a_mass_at_rest_in_the_fold_of_its_potential_stays() -> None:
     folded = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - cg.abs(q[0]), ["x"])
     for method in ("dop853", "rk4"):
         assert not dyn.simulate(folded, [0.0], [0.0], 10.0, method).q.any()
+
+
+def test_what_a_step_holds_beyond_a_surface_does_not_count() -> None:
+    """Neither an event there, nor a force that is no power of the depth beyond the touch."""
+    thrown = dyn.System(
+        lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.0 * q[0], ["x"], forces=lambda q, qd, t: [-7.0 * cg.sign(qd[0])]
+    )
+    landing = dyn.Event("landing", lambda q, qd, t: q[0], direction=-1, terminal=True)
+    run = dyn.simulate(thrown, [0.0], [8.0], 9.0, "taylor", events=landing)
+    assert run.t[-1] == approx(0.5 + math.sqrt(2.0), rel=1e-9)
+    balls = [dyn.Body(name, dyn.Joint("prismatic", (1, 0, 0)), mass=1.0) for name in "ab"]
+    contact = dyn.Contact("a", "b", radius=0.1, to_radius=0.1, stiffness=1e8)
+    hit = dyn.simulate(dyn.Mechanism(balls, (0, 0, 0), forces=[contact]), [-1.0, 0.0], [2.0, 0.0], 2.0)
+    assert hit.qd[-1] == approx([0.0, 2.0], abs=1e-8)
+
+
+def test_a_ball_in_space_slides_rolls_and_bounces() -> None:
+    """Where it rolls when it comes down no friction is needed, and none is there at the touch to tell its side."""
+    ball = dyn.Body("ball", dyn.Joint("free"), mass=1.0, inertia=(0.004, 0.004, 0.004))
+    ground = dyn.Contact("ball", radius=0.1, stiffness=1e5, dissipation=0.2, friction=0.5)
+    model = dyn.Mechanism([ball], forces=[ground])
+    run = dyn.simulate(model, [0.0, 0.0, 0.3, 1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0)
+    assert run.qd[-1, 0] == approx(5.0 / 7.0, rel=1e-9)
+    assert run.qd[-1, 4] * 0.1 == approx(5.0 / 7.0, rel=1e-9)
