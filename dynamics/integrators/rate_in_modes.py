@@ -271,6 +271,8 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         g = [drift[k] if k in late else gap for k, gap in enumerate(g)]
         drift = _along(g, ways, build)
         columns_of = [_along(g, dict(zip(states, jump, strict=False)), build) for jump in jumps]
+    surfaces = list(switches.surfaces.outputs.values())
+    pinning = [surfaces[k] if switches.spacing[k] == 2.0 else None for k in chosen]
     with building(build):
         matrix = [
             [cg.where(holds[i] * holds[j], column[i], 1.0 if i == j else 0.0) for j, column in enumerate(columns_of)]
@@ -280,11 +282,7 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         shares, moves = _solved(matrix, rights)
         rate = [_mixed(each, shares, [jump[i] for jump in jumps]) for i, each in enumerate(f)]
         onto = [_mixed(each, moves, [jump[i] for jump in jumps]) for i, each in enumerate(states)]
-        surfaces = list(switches.surfaces.outputs.values())
-        for hold, surface in zip(holds, [surfaces[k] for k in chosen], strict=True):
-            if surface in states:  # a state that stays zero does so exactly
-                i = states.index(surface)
-                rate[i], onto[i] = cg.where(hold, 0.0, rate[i]), cg.where(hold, 0.0, onto[i])
+        _pin(rate, onto, inputs, [(g, hold) for g, hold in zip(pinning, holds, strict=True) if g is not None], build)
         place = dict(zip(chosen, holds, strict=True))
         turns, margins = list(switches.turns), list(switches.margins.outputs.values())
         margins = [cg.where(place[k], 1.0, g) if k in place else g for (k, _), g in zip(turns, margins, strict=True)]
@@ -300,6 +298,33 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         )
     outputs = dict(zip(problem.rate.outputs, rate, strict=True))
     return replace(problem, rate=Graph(inputs, outputs), projection=project, switches=made, slides=True)
+
+
+def _pin(
+    rate: list[Node], onto: list[Node], inputs: Sequence[Node], held: Sequence[tuple[Node, Node]], build: Builder
+) -> None:
+    """States that stay on a surface g = 0, a sum of constants times states, where hold is 1: they do so exactly.
+
+    Those that are at rest are then without rounding, which would be all that there is of them.
+    """
+    states, t, pinned = inputs[: len(onto)], inputs[len(onto)], set[int]()
+    for g, hold in sorted(held, key=lambda each: len(topological([each[0]]))):
+        slopes = [_along([g], {state: cg.constant(1.0)}, build)[0].value for state in states]
+        numbers = {i: slope for i, slope in enumerate(slopes) if slope}
+        free = [i for i in numbers if i not in pinned]
+        if not free or None in slopes:
+            continue
+        i = free[-1]
+        pinned.add(i)
+        (way,), (off,) = (
+            _along([g], {t: cg.constant(1.0)}, build),
+            folded([g], build, dict(zip(states, onto, strict=True))),
+        )
+        for j, number in numbers.items():
+            if j != i:
+                way = way + number * rate[j]
+        rate[i] = cg.where(hold, -way / numbers[i], rate[i])
+        onto[i] = cg.where(hold, onto[i] - off / numbers[i], onto[i])
 
 
 def _slides(mode: Node, spacing: float) -> Node:

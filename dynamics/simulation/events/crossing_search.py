@@ -29,8 +29,8 @@ MOST_CELLS = 4096  # that wait at once
 MOST_NUMBERS = 2**19  # of operations on the cells that wait, or on points that are looked at together
 FITTED = 8  # degree of polynomials through values
 SHORTEST, FINE = 2.0**-50, 2.0**-12  # of a step, a cell; and one of what the step resolves, but for rounding
-LEFT = 1e-3  # of the largest that a quantity is in a step, by which it has left zero
-PARTS = 32  # of the first step, at whose ends a quantity that begins at zero is looked at
+LEFT = 1e-3  # of the largest that a quantity has been in a step, by which it has left zero
+PARTS = np.array([0.0, *2.0 ** np.arange(-20.0, -5.0), *np.linspace(0.0, 1.0, 33)[1:]])  # where one that begins at zero
 DEGREES = 8  # of dense output, whose matrices are kept
 OFTEN = 200  # calls of a graph, which take about as long as to compile it
 ALIKE = 256  # points, that take about as long as a call
@@ -252,13 +252,12 @@ def _left_at(one: Quantities, p: Array, block: StepBlock, rounding: float) -> fl
     """The share of the first step from which a quantity that begins at zero is looked at; 1 if it stays on its side."""
     if math.isnan(rounding):
         return 0.0
-    s = np.linspace(0.0, 1.0, PARTS + 1)[1:]
-    values = _values(one, p, block, np.zeros(PARTS, dtype=np.intp), s)[0]
-    size = np.abs(values).max()
-    if not size > rounding:
-        return 1.0
-    left = np.flatnonzero(values >= LEFT * size)
-    return float(s[left[0]]) if len(left) else 1.0 - UNIT if values[-1] < 0.0 else 1.0
+    begin, *values = _values(one, p, block, np.zeros(len(PARTS), dtype=np.intp), PARTS)[0]
+    if begin > rounding:
+        return 0.0
+    sizes = np.abs(values)
+    left = np.flatnonzero((values >= LEFT * np.fmax.accumulate(sizes)) & (sizes > rounding))
+    return float(PARTS[1 + left[0]]) if len(left) else 1.0 - UNIT if values[-1] < -rounding else 1.0
 
 
 def _values(one: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:
