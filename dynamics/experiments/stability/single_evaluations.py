@@ -14,12 +14,11 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Compiled, Graph, Node
+from cgraph import Compiled, Graph
 from cgraph._shared import Array
 
 from ...equations.equations_of_motion import forward_dynamics
@@ -174,21 +173,3 @@ def arm_with_parameters(n: int) -> System:
     gravity = cg.variable("g")
     parameters = {str(each.name): 1.0 for each in (*p, gravity)}
     return arm_of_links(list(zip(*columns, strict=True)), damping, gravity, parameters).system
-
-
-def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[Any], gravity: Node | float) -> list[Node]:
-    """The partial Lagrangians by positions and velocities of the centers of mass, K = m v.v / 2 + I w^2 / 2."""
-    partials: list[Node] = []
-    angle, omega = q[0], qd[0]
-    x, y, height = cg.constant(0.0), cg.constant(0.0), cg.constant(0.0)  # velocity of the joint, and its height
-    for i, link in enumerate(links):
-        if i:
-            angle, omega = angle + q[i], omega + qd[i]
-        s, c = cg.sin(angle), cg.cos(angle)
-        r = link.center
-        u, v = x + r * omega * c, y + r * omega * s
-        kinetic = 0.5 * link.mass * (u * u + v * v) + 0.5 * link.inertia * (omega * omega)
-        partials.append(kinetic - link.mass * gravity * (height - r * c))
-        r = link.length
-        x, y, height = x + r * omega * c, y + r * omega * s, height - r * c
-    return partials
