@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cgraph._shared import Array, kept_by_first
+from cgraph._shared import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
@@ -115,7 +115,6 @@ class Ours(Solver):
         self.order = self.method.order
         self.kind = CHOSEN if self.method.adaptive else EQUAL
 
-    @kept_by_first
     def _compiled(self, dense: bool) -> CompiledSteps:
         return compile_steps(step_program(self.problem, self.method, dense=dense), "auto", True)
 
