@@ -6,7 +6,7 @@ from typing import NamedTuple
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, folded, tangents
 
-from ..systems.kinematics import ONE, ZERO, gathered
+from ..systems.kinematics import ONE, ZERO, changes, gathered
 from ..systems.system import System
 from .velocity_nodes import velocity_nodes
 
@@ -39,8 +39,7 @@ def state_rate(system: System, qdd: Sequence[Node] | None) -> dict[Node, Node]:
 
 def along_motion(system: System, nodes: Sequence[Node], build: Builder, qdd: Sequence[Node] | None) -> list[Node]:
     """d/dt of nodes, one forward sweep.  qdd: accelerations, 0 if None."""
-    dots = tangents(state_rate(system, qdd), nodes, build)
-    return [dots.get(node, ZERO) for node in nodes]
+    return changes(state_rate(system, qdd), nodes, build)
 
 
 def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:

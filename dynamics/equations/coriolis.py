@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from cgraph import Node
-from cgraph.extend import Builder, building, folded, tangents, topological
+from cgraph.extend import Builder, building, folded, topological
 
-from ..systems.kinematics import ONE, ZERO
+from ..systems.kinematics import ONE, ZERO, changes
 from ..systems.system import System
 from .equation import Equation, Output, entries, mirrored
 from .equations_of_motion import bias
@@ -55,8 +55,8 @@ def coriolis_matrix(
     (db/dqd + db/dqd at qd = 0) / 2.
     """
     n = system.n
-    columns = [tangents({velocity: ONE}, forces, build) for velocity in system.qd]  # one sweep gives db/dqd_j
-    partials = [[column.get(force, ZERO) for column in columns] for force in forces]  # db/dqd
+    columns = [changes({velocity: ONE}, forces, build) for velocity in system.qd]  # one sweep gives db/dqd_j
+    partials = list(zip(*columns, strict=True))  # db/dqd
     linear = folded(substitute(entries(partials), dict.fromkeys(system.qd, ZERO)), build)  # G
     with building(build):
         halves = [0.5 * (a + b) for a, b in zip(entries(partials), linear, strict=True)]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents
 
-from ..systems.kinematics import ONE, ZERO
+from ..systems.kinematics import ONE, ZERO, dot
 from ..systems.system import System
 from .equation import Equation, Output
 from .substitute import substitute
@@ -72,7 +72,7 @@ def _legendre(system: System, lagrangian: Node) -> Node:
     build = Builder()
     momenta = cotangents({lagrangian: ONE}, system.qd, build)
     with building(build):
-        return sum([p * qd for p, qd in zip(momenta, system.qd, strict=True)], ZERO) - lagrangian
+        return dot(momenta, system.qd) - lagrangian
 
 
 def _at_rest(system: System) -> Node:

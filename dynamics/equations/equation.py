@@ -11,7 +11,7 @@ from functools import update_wrapper
 from inspect import cleandoc, signature
 from itertools import product
 from types import FunctionType
-from typing import Protocol, TypeVar
+from typing import ParamSpec, Protocol, TypeVar
 
 import cgraph as cg
 from cgraph import Graph, Node, _shared
@@ -37,12 +37,13 @@ SECTIONS = ("Parameters", "Returns", "Warns", "Raises", "Examples")
 
 Derivation = Callable[[System], Iterable[Sequence[Node]]]
 Documented = TypeVar("Documented", bound=Callable[..., object])
+More = ParamSpec("More")
 
 
-class GraphOfModel(Protocol):
-    """A public function from a model to a graph."""
+class GraphOfModel(Protocol[More]):
+    """A public function from a model, and more, to a graph."""
 
-    def __call__(self, model: Model) -> Graph:
+    def __call__(self, model: Model, *more: More.args, **named: More.kwargs) -> Graph:
         """The graph of the model."""
 
 
@@ -104,7 +105,7 @@ class Equation:
         if unknown := [kind for kind in self.inputs if kind not in (*VARIABLES, "p")]:
             raise ValueError(f"inputs of an equation are among {', '.join(VARIABLES)}, p, got {unknown[0]!r}")
 
-    def __call__(self, derivation: Derivation) -> GraphOfModel:
+    def __call__(self, derivation: Derivation) -> GraphOfModel[[]]:
         """The public function of a derivation."""
 
         def graph(model: Model) -> Graph:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import cgraph as cg
 from cgraph import Graph
 from cgraph._shared import kept_by_first, require_choice
 
@@ -85,12 +84,6 @@ def _normalization(system: System) -> Graph | None:
         return None
     states = [*system.kinematics.normalized(system.q), *system.qd]
     return Graph([*system.q, *system.qd], {f"x{k}": node for k, node in enumerate(states)})
-
-
-@kept_by_first
-def normalizer(normalization: Graph) -> cg.Compiled:
-    """The function of one state, in Python, for a start."""
-    return cg.compile(normalization, "python")
 
 
 class StateInputs(NamedTuple):

@@ -76,7 +76,7 @@ def exponent(x: Sequence[float], y: Sequence[float]) -> float:
 def machine() -> str:
     """The processor and the versions that the figures belong to."""
     packages = []
-    for name in ("numpy", "llvmlite", "casadi", "pin", "mujoco", "heyoka", "jax", "sympy", "torch"):
+    for name in ("numpy", "llvmlite", "casadi", "pin", "mujoco", "heyoka", "jax"):
         with suppress(metadata.PackageNotFoundError):
             packages.append(f"{name} {metadata.version(name)}")
     return f"{_processor()}, Python {platform.python_version()}, {', '.join(packages)}"

@@ -37,9 +37,8 @@ class MujocoTwin:
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
         self.mechanism = require_mechanism(of, "MuJoCo").bind()
-        bodies = [
-            replace(body, joint=replace(body.joint, limits=None)) for body in self.mechanism.moving
-        ]  # welds merged
+        merged = self.mechanism.moving
+        bodies = [replace(body, joint=replace(body.joint, limits=None)) for body in merged]
         self.model = mujoco_spec(replace(self.mechanism, bodies=bodies, locked={}, loops=()), timestep).compile()
         self.data = self.mujoco.MjData(self.model)
 

@@ -176,20 +176,18 @@ def _not_modelled(mj: MjModel) -> list[str]:
     sprung = [] if disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
     tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
-    others = present(
-        {
-            f"springs of free joints, or of turned ball joints ({listed(_joint_names(mj, sprung))})": sprung,
-            f"tendons with a spring, damper or mass ({listed(tendons)})": pulling,
-            "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
-            f"joints with several dampings or armatures ({listed(_joint_names(mj, _uneven(mj)))})": _uneven(mj),
-            "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
-            "a fluid (density or viscosity)": mj.opt.density or mj.opt.viscosity,
-            "gravity compensation": _any(mj, "body_gravcomp") and not disabled(mj, "GRAVITY"),
-            "flexible bodies": getattr(mj, "nflex", 0),
-            "plugins": getattr(mj, "nplugin", 0),
-        }
-    )
-    return [*others, *other_equalities(mj)]
+    others = {
+        f"springs of free joints, or of turned ball joints ({listed(_joint_names(mj, sprung))})": sprung,
+        f"tendons with a spring, damper or mass ({listed(tendons)})": pulling,
+        "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
+        f"joints with several dampings or armatures ({listed(_joint_names(mj, _uneven(mj)))})": _uneven(mj),
+        "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
+        "a fluid (density or viscosity)": mj.opt.density or mj.opt.viscosity,
+        "gravity compensation": _any(mj, "body_gravcomp") and not disabled(mj, "GRAVITY"),
+        "flexible bodies": getattr(mj, "nflex", 0),
+        "plugins": getattr(mj, "nplugin", 0),
+    }
+    return [*present(others), *other_equalities(mj)]
 
 
 def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
@@ -204,18 +202,16 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     left = [i for i in range(actuators(mj)) if not (smooth.actuators and modelled(mj, i))]
     acting = {} if disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in left}
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
-    others = present(
-        {
-            untaken(has_balls(mj)): touching and smooth.contacts is None and not disabled(mj, "CONSTRAINT", "CONTACT"),
-            f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
-            "tendon limits": _any(mj, "tendon_limited") and limited,
-            f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,
-            "friction loss of tendons": _any(mj, "tendon_frictionloss") and rubbing,
-            f"actuators ({len(acting) - len(servos)})": len(acting) > len(servos),
-            f"actuators that act with no input ({listed(servos)})": servos,
-        }
-    )
-    return [*others, *left_of_equalities(mj)]
+    others = {
+        untaken(has_balls(mj)): touching and smooth.contacts is None and not disabled(mj, "CONSTRAINT", "CONTACT"),
+        f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
+        "tendon limits": _any(mj, "tendon_limited") and limited,
+        f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,
+        "friction loss of tendons": _any(mj, "tendon_frictionloss") and rubbing,
+        f"actuators ({len(acting) - len(servos)})": len(acting) > len(servos),
+        f"actuators that act with no input ({listed(servos)})": servos,
+    }
+    return [*present(others), *left_of_equalities(mj)]
 
 
 def _at_rest(mj: MjModel, i: int) -> str:

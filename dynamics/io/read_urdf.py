@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from decimal import Decimal
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
@@ -61,13 +62,8 @@ def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False,
                 bodies.append(Body(child, _joint(element, name, child), parent, **inertials[child].fields))
         outside = [*_outside(robot, joints, smooth), *of_no_effect, *_negative(inertials, by_digits=True)]
         left_out = refused_or_left_out([*refused, *_negative(inertials, by_digits=False)], outside, ignore)
-        mechanism = Mechanism(
-            bodies,
-            _gravity(robot),
-            _forces(joints, smooth),
-            left_out=left_out,
-            loops=_couplings(joints, leaders),
-        )
+        forces, loops = _forces(joints, smooth), _couplings(joints, leaders)
+        mechanism = Mechanism(bodies, _gravity(robot), forces, left_out=left_out, loops=loops)
         return mechanism if smooth.contacts is None else with_contacts(mechanism, smooth.contacts, *_balls(links))
     except MechanismError as error:
         raise MechanismError(f"URDF, {called}: {error}") from None
@@ -313,28 +309,21 @@ def _limits(joint: Element, name: str) -> tuple[float, float] | None:
     return None if (lower, upper) == (-FAR_LIMIT, FAR_LIMIT) else (lower, upper)
 
 
-def _numbers_of_limits(joint: Element, name: str) -> Limits:
-    """Limits of position, velocity and effort. Raises ValueError for such that cannot be."""
+def _possible_limits(joint: Element, name: str) -> Limits | None:
+    """Limits of position, velocity and effort; None for such that cannot be."""
     limit = _one(joint, f"joint {name!r}", "limit")
     if limit is None or joint.get("type") not in _SINGLE:
         return NO_LIMITS
     ends = _limits(joint, name) or (-math.inf, math.inf)
     lower, upper = (end if abs(end) < FAR_LIMIT else math.copysign(math.inf, end) for end in ends)
-    velocity, effort = (float(limit.get(what, "inf")) for what in ("velocity", "effort"))
-    return Limits((lower, upper), _both_ways(velocity), _both_ways(effort))
+    with suppress(ValueError):
+        velocity, effort = (float(limit.get(what, "inf")) for what in ("velocity", "effort"))
+        return Limits((lower, upper), _both_ways(velocity), _both_ways(effort))
+    return None
 
 
 def _both_ways(size: float) -> tuple[float, float]:
     return ANYTHING if size >= FAR_LIMIT else (-size, size)
-
-
-def _possible_limits(joint: Element, name: str) -> Limits | None:
-    try:
-        return _numbers_of_limits(joint, name)
-    except MechanismError:
-        raise
-    except ValueError:
-        return None
 
 
 def _friction(joint: Element, name: str) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph._shared import Array, real_array, real_number, require_flag
+from cgraph._shared import real_array, real_number, require_flag
 
 from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.bodies.limits import ANYTHING, Limits
@@ -172,14 +172,15 @@ def _actuator(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Actuato
         float(mj.actuator_gear[first_output(mj, i), 0]),
         gain,
         bias,
-        None if disabled(mj, "CLAMPCTRL") else _range(mj.actuator_ctrllimited[ctrl], mj.actuator_ctrlrange[ctrl]),
-        _range(mj.actuator_forcelimited[i], mj.actuator_forcerange[i]),
-        _range(mj.jnt_actfrclimited[j], mj.jnt_actfrcrange[j]),
+        None if disabled(mj, "CLAMPCTRL") else _range(mj, "actuator_ctrl", ctrl),
+        _range(mj, "actuator_force", i),
+        _range(mj, "jnt_actfrc", j),
     )
 
 
-def _range(limited: int, ends: Array) -> Range | None:
-    return (float(ends[0]), float(ends[1])) if limited else None
+def _range(mj: MjModel, what: str, i: int) -> Range | None:
+    low, high = getattr(mj, f"{what}range")[i].tolist()
+    return (low, high) if getattr(mj, f"{what}limited")[i] else None
 
 
 def joint_limits(mj: MjModel, j: int) -> Limits:
@@ -187,8 +188,8 @@ def joint_limits(mj: MjModel, j: int) -> Limits:
     driving = [i for i in range(actuators(mj)) if _on_joint(mj, i) and mj.actuator_trnid[i, 0] == j]
     efforts = [_effort(mj, i) for i in driving]
     total = (sum([low for low, _ in efforts]), sum([high for _, high in efforts])) if efforts else ANYTHING
-    effort = _clipped(total, _range(mj.jnt_actfrclimited[j], mj.jnt_actfrcrange[j]))
-    return Limits(_range(mj.jnt_limited[j], mj.jnt_range[j]) or ANYTHING, effort=effort)
+    effort = _clipped(total, _range(mj, "jnt_actfrc", j))
+    return Limits(_range(mj, "jnt_", j) or ANYTHING, effort=effort)
 
 
 def _effort(mj: MjModel, i: int) -> Range:
@@ -196,10 +197,8 @@ def _effort(mj: MjModel, i: int) -> Range:
     kinds = [_called(kind, getattr(mj, f"actuator_{kind.lower()}type")[i]) for kind in ("Dyn", "Gain", "Bias")]
     ctrl, force = inputs(mj, i), ANYTHING
     if kinds == ["none", "fixed", "none"] and len(ctrl) == 1 and not disabled(mj, "CLAMPCTRL"):
-        force = _scaled(
-            mj.actuator_gainprm[i, 0], _range(mj.actuator_ctrllimited[ctrl[0]], mj.actuator_ctrlrange[ctrl[0]])
-        )
-    force = _clipped(force, _range(mj.actuator_forcelimited[i], mj.actuator_forcerange[i]))
+        force = _scaled(mj.actuator_gainprm[i, 0], _range(mj, "actuator_ctrl", ctrl[0]))
+    force = _clipped(force, _range(mj, "actuator_force", i))
     return _scaled(mj.actuator_gear[first_output(mj, i), 0], force)
 
 

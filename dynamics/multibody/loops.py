@@ -182,8 +182,6 @@ def velocity_rows(loops: Sequence[Loop], chain: Callable[[str], KinematicChain])
 
 def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     """Raises MechanismError unless the loop's bodies are there and its numbers are what its kind needs."""
-    if not isinstance(loop, Loop):
-        raise MechanismError(f"loops must be of the type Loop, got {type(loop).__name__}: {loop!r:.60}")
     for name in (loop.body, loop.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
             raise MechanismError(f"there is a loop on the unknown body {name!r:.80}")

@@ -69,9 +69,10 @@ def coefficients(
     return tuple([each if isinstance(each, Node) else number for each, number in zip(entries, known, strict=True)])
 
 
-def parameter_items(parameters: Mapping[str, float] | None) -> Iterable[tuple[str, float]]:
-    """Names and values. Raises TypeError for what is no mapping."""
-    return () if parameters is None else require_mapping("parameters", parameters, "name: number").items()
+def parameters_of(parameters: Mapping[str, float] | None) -> dict[str, float]:
+    """{name: value}, checked. Raises TypeError or ValueError."""
+    given = {} if parameters is None else require_mapping("parameters", parameters, "name: number")
+    return {name: parameter_value(name, value) for name, value in given.items()}
 
 
 def parameter_value(name: str, value: float) -> float:

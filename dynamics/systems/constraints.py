@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from cgraph import Node
 from cgraph._shared import check_name
-from cgraph.extend import Builder, cotangents, tangents, topological
+from cgraph.extend import Builder, cotangents, topological
 
 from .arguments import Parameters, call_user_function, node_or_number, sequence
-from .kinematics import ONE, ZERO, Kinematics
+from .kinematics import ONE, ZERO, Kinematics, changes
 
 Function = Callable[..., object]
 
@@ -97,8 +97,7 @@ class Constraints:
         """d/dt of rows, as they are folded elsewhere.  u_dot: accelerations, 0 if None."""
         k = self.kinematics
         along = dict(zip(k.q, k.q_dot, strict=True)) | dict(zip(k.u, u_dot or (), strict=u_dot is not None))
-        dots = tangents(along | {self.t: ONE}, rows, build)
-        return [dots.get(row, ZERO) for row in rows]
+        return changes(along | {self.t: ONE}, rows, build)
 
     def without(self, dropped: Mapping[int, float]) -> Constraints:
         """The constraints with 0 for some rows, which are open by so much."""

@@ -11,7 +11,7 @@ from cgraph import Graph, Node
 from cgraph._shared import memo, or_nearest
 from cgraph.extend import topological
 
-from .arguments import Parameters, parameter_items, parameter_value
+from .arguments import Parameters, parameters_of
 from .model import Equations, Model, as_equations
 from .system import System, generalized_forces
 
@@ -76,7 +76,7 @@ def controlled(
     system = model.system
     if system is None:
         raise TypeError("a controller gives forces, and none act on a system of first order: write it into the rate")
-    gains = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
+    gains = parameters_of(parameters)
     if shared := [name for name in gains if name in system.parameters]:
         raise ValueError(f"{shared[0]!r} is a parameter of the model; choose another name for that of the controller")
     names = (*system.parameters, *gains)

@@ -1,6 +1,6 @@
 """Kinematics: how the velocities of a system move its coordinates, and what that does to forces."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,17 @@ def gathered(pairs: Iterable[tuple[Node, Node]]) -> dict[Node, Node]:
     for node, value in pairs:
         sums[node] = sums[node] + value if node in sums else value
     return sums
+
+
+def changes(seeds: Mapping[Node, Node], nodes: Collection[Node], build: Builder | None = None) -> list[Node]:
+    """Changes of nodes along {node: its change}, 0 of those that do not change: one forward sweep."""
+    dots = tangents(seeds, nodes, build)
+    return [dots.get(node, ZERO) for node in nodes]
+
+
+def dot(a: Sequence[Node], b: Sequence[Node]) -> Node:
+    """The sum of products, 0 of none."""
+    return sum([x * y for x, y in zip(a, b, strict=True)], ZERO)
 
 
 class Kinematics:
@@ -108,13 +119,11 @@ class Kinematics:
         v = cg.variables([f"v{i}" for i in range(n)])
         along, across = self.rate(u), self.rate(v)
         build = Builder()
-        first = tangents(dict(zip(self.q, along, strict=True)), across, build)  # D(G v)[G u]
-        second = tangents(dict(zip(self.q, across, strict=True)), along, build)
+        straight = changes(dict(zip(self.q, along, strict=True)), across, build)  # D(G v)[G u]
+        bent = changes(dict(zip(self.q, across, strict=True)), along, build)  # D(G u)[G v]
         with building(build):
-            bent = [second.get(node, ZERO) for node in along]  # D(G u)[G v]
-            c = [sum([entry * x for entry, x in zip(row, v, strict=True)], ZERO) for row in self.brackets(build)]
+            c = [dot(row, v) for row in self.brackets(build)]
             spanned = self.rate(c)
-        straight = [first.get(node, ZERO) for node in across]
         outputs = [*bent, *straight, *spanned, *[node for row in slopes for node in row]]
         graph = Graph([*self.q, *u, *v], {f"{k}": node for k, node in enumerate(outputs)})
         self._compare(graph, n)

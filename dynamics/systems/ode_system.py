@@ -10,16 +10,7 @@ from cgraph import Graph, Node, _shared
 from cgraph._shared import HoldsNodes
 from cgraph.extend import topological
 
-from .arguments import (
-    TIME,
-    Parameters,
-    call_user_function,
-    names_of,
-    one_for_each,
-    parameter_items,
-    parameter_value,
-    require_known,
-)
+from .arguments import TIME, Parameters, call_user_function, names_of, one_for_each, parameters_of, require_known
 
 RESERVED = (TIME, "dt")
 
@@ -63,7 +54,7 @@ class OdeSystem(HoldsNodes):
         self.n = len(self.states)  # number of states
         if named := [name for name in RESERVED if name in self.states]:
             raise ValueError(f"a state cannot be called {named[0]!r}, which is the name of time; choose another")
-        self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
+        self.parameters = parameters_of(parameters)
         if shared := [name for name in self.states if name in self.parameters]:
             raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
         p = Parameters(self.parameters)

@@ -22,8 +22,7 @@ from .arguments import (
     coefficients,
     node_or_number,
     one_for_each,
-    parameter_items,
-    parameter_value,
+    parameters_of,
     require_known,
     sequence,
 )
@@ -111,7 +110,7 @@ class System(HoldsNodes):
         self.nq, self.n = len(self.q), len(self.qd)
         if body_terms is None:  # the types of joints are known to be consistent
             self.kinematics.require_consistent()
-        self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
+        self.parameters = parameters_of(parameters)
         self.damping = coefficients("damping", damping, self.velocities)
         p = Parameters(self.parameters)
         energy = call_user_function("lagrangian", lagrangian, self.q, self.qd, self.t, p)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 import cgraph as cg
 from cgraph import Graph
 from cgraph._shared import Array, real_number, require_whole
-from cgraph.extend import Builder, cotangents, tangents
+from cgraph.extend import Builder, cotangents
 
 from ..equations.constraints.constraint_rank import CLEAR
 from ..equations.coriolis import coriolis, require_quadratic
@@ -26,7 +26,7 @@ from ..equations.mass_matrix.singular_mass_matrix import balanced
 from ..equations.states.evaluate import evaluate
 from ..equations.torque_parts.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_parts.torque_table import TorqueTable
-from ..systems.kinematics import ONE, ZERO
+from ..systems.kinematics import ONE, changes, gathered
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
@@ -151,8 +151,8 @@ class _Checks:
         """d/dt of the outputs along (qd, qdd)."""
         system = self.system
         x_dot = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
-        dots = tangents(x_dot | ({system.t: ONE} if self.timed else {}), graph.outputs.values())
-        return self.graph({name: dots.get(node, ZERO) for name, node in graph.outputs.items()})
+        rates = changes(x_dot | ({system.t: ONE} if self.timed else {}), graph.outputs.values())
+        return self.graph(dict(zip(graph.outputs, rates, strict=True)))
 
     @cached_property
     def inverse(self) -> Graph:
@@ -299,13 +299,12 @@ class _Checks:
         state = [*system.q, *system.qd, *system.qdd]
         u, v = self.rng.normal(size=system.n), self.rng.normal(size=len(state))
         torques = list(self.inverse.outputs.values())
-        dots = tangents({x: cg.constant(float(each)) for x, each in zip(state, v, strict=True)}, torques)
-        pushed = self.value(self.graph({str(i): dots.get(node, ZERO) for i, node in enumerate(torques)}))
-        seeds: dict[cg.Node, cg.Node] = {}
-        for node, each in zip(torques, u, strict=True):
-            seeds[node] = seeds.get(node, ZERO) + float(each)
-        bars = cotangents(seeds, state, Builder())
-        pulled = self.value(self.graph({str(i): bar for i, bar in enumerate(bars)}))
+        given, taken = ([cg.constant(float(each)) for each in numbers] for numbers in (v, u))
+        dots = changes(dict(zip(state, given, strict=True)), torques)
+        bars = cotangents(gathered(zip(torques, taken, strict=True)), state, Builder())
+        pushed, pulled = (
+            self.value(self.graph({str(i): node for i, node in enumerate(nodes)})) for nodes in (dots, bars)
+        )
         terms = np.abs(pushed * u).sum(axis=-1) + np.abs(pulled * v).sum(axis=-1)
         return rounded("AD: u . (J v) = (J^T u) . v for tau", (pushed @ u - pulled @ v)[:, None], terms[:, None])
 
@@ -316,8 +315,8 @@ class _Checks:
         sizes = {"q": system.nq, "qd": system.n, "qdd": system.n}
         line = {name: self.rng.normal(size=sizes[name]) for name in names}
         given = [cg.constant(float(each)) for name in names for each in line[name]]
-        dots = tangents(dict(zip([*system.q, *system.qd, *system.qdd], given, strict=True)), graph.outputs.values())
-        slope = self.value(self.graph({name: dots.get(node, ZERO) for name, node in graph.outputs.items()}))
+        dots = changes(dict(zip([*system.q, *system.qd, *system.qdd], given, strict=True)), graph.outputs.values())
+        slope = self.value(self.graph(dict(zip(graph.outputs, dots, strict=True))))
 
         def moved(steps: float) -> Array:
             return self.value(graph, **{name: self.at[name] + steps * STEP * line[name] for name in names})
@@ -344,10 +343,9 @@ class _Checks:
 
         def along(graph: Graph, more: dict[cg.Node, cg.Node]) -> Array:
             """The first n outputs' slopes."""
-            outputs = list(graph.outputs.values())[:n]
-            dots = tangents(seeds | more, outputs)
-            slopes = {f"{i}": dots.get(node, ZERO) for i, node in enumerate(outputs)}
-            return self.value(system.graph(slopes, system.q, system.qd, list(more)))
+            slopes = changes(seeds | more, list(graph.outputs.values())[:n])
+            outputs = dict(zip(graph.outputs, slopes, strict=False))
+            return self.value(system.graph(outputs, system.q, system.qd, list(more)))
 
         pushed = along(self.inverse, dict(zip(system.qdd, a, strict=True)))
         entries = self.value(inverse_dynamics_derivatives(system))[:, n:].reshape(-1, 3, n, n)
@@ -357,16 +355,12 @@ class _Checks:
         clear = new_rows >= CLEAR
         if not clear.any():
             return
-        slopes = np.abs(terms[..., : 2 * n]).sum(axis=-1) + np.abs(
-            line[3 * n :]
-        )  # of the forces, which constraints take up
+        slopes = np.abs(terms[..., : 2 * n]).sum(axis=-1) + np.abs(line[3 * n :])  # of forces that constraints take up
         pushed = along(forward_dynamics(system), dict(zip(system.tau, f, strict=True)))
         matrices = self.value(state_space(system))
-        a_rows, b_rows = (
-            matrices[:, : 4 * n * n].reshape(-1, 2 * n, 2 * n),
-            matrices[:, 4 * n * n :].reshape(-1, 2 * n, n),
-        )
-        terms = np.concatenate([a_rows, b_rows], axis=-1)[:, n:] * np.delete(line, np.s_[2 * n : 3 * n])
+        a_entries, b_entries = np.split(matrices, [4 * n * n], axis=1)
+        a_and_b = [a_entries.reshape(-1, 2 * n, 2 * n), b_entries.reshape(-1, 2 * n, n)]
+        terms = np.concatenate(a_and_b, axis=-1)[:, n:] * np.delete(line, np.s_[2 * n : 3 * n])
         missed = (inertia @ (terms.sum(axis=-1) - pushed)[..., None])[..., 0]
         sizes = (np.abs(inertia) @ np.abs(terms).sum(axis=-1)[..., None])[..., 0] + slopes
         sizes = sizes[clear] / new_rows[clear, None] ** 2

@@ -10,13 +10,13 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph
 from cgraph._shared import Array
-from cgraph.extend import Builder, cotangents, tangents
+from cgraph.extend import Builder, cotangents
 
 from ..equations.constraints.constraint_rank import CLEAR
 from ..equations.constraints.nearly_redundant_rows import least_new
 from ..equations.states.consistent_state import nearest_state
 from ..systems.constraints import ConstraintError
-from ..systems.kinematics import ONE, ZERO
+from ..systems.kinematics import ONE, changes
 from ..systems.system import System
 from .residual import Residual, rounded
 
@@ -29,9 +29,8 @@ def random_states(system: System, count: int, t: float, speed: float, rng: np.ra
 
     Raises ConstraintError where there are constraints, and a state cannot be moved onto them.
     """
-    at = {"q": _configurations(system, count, rng)} | {
-        name: speed * rng.normal(size=(count, system.n)) for name in ("qd", "qdd", "tau")
-    }
+    at = {"q": _configurations(system, count, rng)}
+    at |= {name: speed * rng.normal(size=(count, system.n)) for name in ("qd", "qdd", "tau")}
     if len(system.constraints):
         for k in range(count):
             at["q"][k], at["qd"][k] = _moved(system, at["q"][k], at["qd"][k], t, rng)
@@ -114,10 +113,10 @@ class Held:
 
         forces: of the constraints in absolute value, (N, n): accelerations are M^-1 of forces that in part cancel.
         """
-        system, (build, rates) = self.system, (Builder(), self.system.constraints.rates)
+        system = self.system
         x_dot = dict(zip(system.q, system.q_dot, strict=True)) | {system.t: ONE}
-        dots = tangents(x_dot, rates, build)
-        graph = system.graph({str(k): dots.get(z, ZERO) for k, z in enumerate(rates)}, system.q, system.qd)
+        rates = changes(x_dot, system.constraints.rates)
+        graph = system.graph({str(k): rate for k, rate in enumerate(rates)}, system.q, system.qd)
         change, pushed = self.value(graph), np.swapaxes(self.matrix, 1, 2) * accelerations[:, None, :]
         size = _sizes(inertia)
         scaled = np.linalg.pinv(inertia / size / np.swapaxes(size, 1, 2), hermitian=True)  # singular without mass

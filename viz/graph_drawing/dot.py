@@ -6,16 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
-from cgraph import Edge, Graph, Node
-from cgraph._shared import (
-    counted,
-    require_choice,
-    require_flag,
-    require_graph,
-    require_mapping,
-    require_sequence,
-    require_texts,
-)
+from cgraph import Edge, Graph, Node, _shared
 from cgraph.extend import Names
 
 from .. import theme
@@ -107,28 +98,28 @@ def to_dot(
     >>> [line.split("[")[0].strip() for line in drawing.source.splitlines() if "->" in line]
     ['n0 -> n1', 'n1 -> o0']
     """
-    require_graph("to_dot", graph)
-    require_choice("rankdir", rankdir, ("BT", "TB", "LR", "RL"))
-    words = require_texts("legend", legend) if isinstance(legend, Mapping) else {}
+    _shared.require_graph("to_dot", graph)
+    _shared.require_choice("rankdir", rankdir, ("BT", "TB", "LR", "RL"))
+    words = _shared.require_texts("legend", legend) if isinstance(legend, Mapping) else {}
     if not isinstance(legend, Mapping):
-        require_flag("legend", legend)
+        _shared.require_flag("legend", legend)
     for what, text in (("caption", "" if caption is None else caption), ("marked_label", marked_label)):
         if not isinstance(text, str):
             raise TypeError(f"{what} must be text, got {type(text).__name__}: {text!r:.60}")
     plan = Plan(
         graph,
-        require_texts("names", names),
-        {} if formulas is None else require_mapping("formulas", formulas, "node: text"),
+        _shared.require_texts("names", names),
+        {} if formulas is None else _shared.require_mapping("formulas", formulas, "node: text"),
         _marks(marked, marked_label),
-        frozenset(require_sequence("marked_edges", marked_edges, "edges", tuple)),
-        frozenset(require_sequence("wrong_outputs", wrong_outputs, "names", str)),
+        frozenset(_shared.require_sequence("marked_edges", marked_edges, "edges", tuple)),
+        frozenset(_shared.require_sequence("wrong_outputs", wrong_outputs, "names", str)),
         _cluster_rule(clusters),
-        require_sequence("collapse", collapse, "tags", str),
-        frozenset(graph.nodes if only is None else require_sequence("only", only, "nodes", Node)),
+        _shared.require_sequence("collapse", collapse, "tags", str),
+        frozenset(graph.nodes if only is None else _shared.require_sequence("only", only, "nodes", Node)),
     )
     drawing = digraph(rankdir)
     if caption is not None:
-        counts = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.edges), 'edge')}"
+        counts = f"{_shared.counted(len(graph.nodes), 'node')}, {_shared.counted(len(graph.edges), 'edge')}"
         counts = counts if only is None else f"{len(set(only))} of {counts}"
         drawing.attr(label=literal(f"{caption}\n{counts}" if caption else counts), labelloc="b", fontsize="16")
     boxes = list(plan.boxes())
@@ -147,7 +138,7 @@ def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str
         raise ValueError(f"marked nodes come in at most {len(theme.MARKS)} groups, got {len(groups)}")
     marks: dict[Node, Paint] = {}
     for paint, (group, given) in zip(theme.MARKS, groups.items(), strict=False):
-        nodes = require_sequence("marked", given, "nodes", Node)
+        nodes = _shared.require_sequence("marked", given, "nodes", Node)
         if both := [node for node in nodes if node in marks]:
             raise ValueError(f"{len(both)} marked nodes are in both groups, such as {both[0]!r}")
         marks |= dict.fromkeys(nodes, replace(paint, words=group))
@@ -170,7 +161,7 @@ def _cluster_rule(clusters: bool | Sequence[str] | ClusterRule) -> ClusterRule:
     if isinstance(clusters, bool):
         return main_tag if clusters else lambda node: None
     given = [clusters] if isinstance(clusters, str) else clusters
-    chosen = frozenset(require_sequence("clusters", given, "tags, or True, False or a function of a node", str))
+    chosen = frozenset(_shared.require_sequence("clusters", given, "tags, or True, False or a function of a node", str))
     return lambda node: _only(node.tags & chosen)
 
 

@@ -9,12 +9,13 @@ from functools import cached_property
 import cgraph as cg
 from cgraph import Graph, GraphError
 from cgraph._shared import Json, or_nearest
-from cgraph.extend import Names, cotangents, tangents
+from cgraph.extend import Names, cotangents
 from dynamics import display_names, torque_by_cause
 from dynamics.equations.torque_parts.torque_table import TorqueTable
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.multibody.quantities.torque_causes import SPURIOUS
 from dynamics.scenes import Scene
+from dynamics.systems.kinematics import ONE, changes
 
 BAR, BODIES, ZEROS = 24, 6, 6  # characters of the longest bar; bodies listed of a cause; names listed of what is 0
 ROUNDING = 1e-14  # of the sum of all sizes: what is smaller is told as 0
@@ -178,9 +179,9 @@ class CauseTable:
         if by:
             source = self.names.one(by, "input")
             nodes = own.by_name.get(str(source.name), [])
-            dots = tangents({nodes[0]: cg.constant(1.0)}, list(chosen.values())) if nodes else {}
-            chosen = {name: dots.get(node, cg.constant(0.0)) for name, node in chosen.items()}
-            whole = tangents({source: cg.constant(1.0)}, [whole]).get(whole, cg.constant(0.0))
+            slopes = changes(dict.fromkeys(nodes[:1], ONE), chosen.values())
+            chosen = dict(zip(chosen, slopes, strict=True))
+            (whole,) = changes({source: ONE}, [whole])
             what = f"d {what} / d {self.names.called(by)}"
             beside = self.units.get(str(source.name), "")
             unit = unit if beside == "1" else f"{unit} per {beside}" if unit and beside else ""

@@ -11,16 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph._shared import (
-    Array,
-    check_writable,
-    real_array,
-    real_number,
-    require_flag,
-    require_path,
-    require_sequence,
-    write_files,
-)
+from cgraph import _shared
+from cgraph._shared import Array
 from dynamics import Trajectory, scenes
 from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.multibody.trees.mechanism import as_mechanism
@@ -99,23 +91,23 @@ def animate(
     >>> film[:6]
     b'GIF89a'
     """
-    target = None if path is None else require_path("the film's file", path)
+    target = None if path is None else _shared.require_path("the film's file", path)
     if target is not None:
         require_film(target)
-        check_writable(target)
+        _shared.check_writable(target)
     check_can_plot()
     if not isinstance(title, str):
         raise TypeError(f"title must be text, got {type(title).__name__}: {title!r:.60}")
     model = scenes.of_model(model)
     known = _motions(model, motions)
-    wrong = require_sequence("marked", marked, "words of motions", str)
+    wrong = _shared.require_sequence("marked", marked, "words of motions", str)
     if unknown := [each for each in wrong if each not in known]:
         raise ValueError(f"marked: there is no motion {unknown[0]!r:.80} (there are {', '.join(known)})")
     times = _times(known.values(), speed)
     panel = _panel(model, known, times, wanted, set(wrong))
-    made = Animation(film(panel, times, require_flag("dark", dark), title))
+    made = Animation(film(panel, times, _shared.require_flag("dark", dark), title))
     if target is not None:
-        write_files({target: made})
+        _shared.write_files({target: made})
     return made
 
 
@@ -132,7 +124,7 @@ def _motions(model: Model, motions: object) -> dict[str, Trajectory]:
     elif isinstance(motions, Mapping):
         known = dict(motions)
     else:
-        several = require_sequence("motions", motions, "Trajectory")
+        several = _shared.require_sequence("motions", motions, "Trajectory")
         known = {str(i + 1) if len(several) > 1 else "": each for i, each in enumerate(several)}
     if not 1 <= len(known) <= MOST_MOTIONS:
         raise ValueError(f"a film shows 1 to {MOST_MOTIONS} motions side by side, got {len(known)}")
@@ -151,7 +143,7 @@ def _motions(model: Model, motions: object) -> dict[str, Trajectory]:
 
 def _times(motions: Collection[Trajectory], speed: float) -> Array:
     """The instants of the frames, and those between, from the first start to the last end."""
-    if not 0.0 < real_number("speed", speed) < math.inf:
+    if not 0.0 < _shared.real_number("speed", speed) < math.inf:
         raise ValueError(f"speed must be positive and finite, got {speed!r}")
     start = min(float(min(each.t[0], each.t[-1])) for each in motions)
     end = max(float(max(each.t[0], each.t[-1])) for each in motions)
@@ -195,7 +187,7 @@ def _panel(
 def _wanted(wanted: Callable[[Array], ArrayLike], times: Array, nq: int) -> Array:
     if not callable(wanted) or isinstance(wanted, type):
         raise TypeError(f"wanted must be a function of times, got {type(wanted).__name__}: {wanted!r:.60}")
-    found = real_array("wanted", wanted(times))
+    found = _shared.real_array("wanted", wanted(times))
     if found.shape != (len(times), nq) or not np.isfinite(found).all():
         raise ValueError(f"wanted must give finite coordinates (T, nq) = ({len(times)}, {nq}), got shape {found.shape}")
     return found

@@ -178,16 +178,8 @@ def _first_order(scene: Scene) -> Live:
     start = {name: float(values.get(name, 0.0)) for name in rate.input_names}  # the time is 0
     sides, of_sides = _sides(scene)
     meters = [*[(f"d {name}/dt", "", "rate") for name in scene.coordinates], *of_sides]
-    return Live(
-        rate,
-        start,
-        Graph(rate.inputs, rate.outputs | sides),
-        meters,
-        dt=_step(scene),
-        methods=TABLEAUS,
-        units={"t": "s"},
-        notes=NOTES,
-    )
+    shown = Graph(rate.inputs, rate.outputs | sides)
+    return Live(rate, start, shown, meters, dt=_step(scene), methods=TABLEAUS, units={"t": "s"}, notes=NOTES)
 
 
 def _sides(scene: Scene, form: str = "velocity") -> tuple[dict[str, Node], list[tuple[str, str, str]]]:

@@ -33,9 +33,8 @@ def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callab
     Where one of them is by velocities and all are right, what derivatives the other carries, see `derivative_class`.
     """
     known = {each.graph: each for each in verdicts}
-    if NEWTON_EULER in [each.formulation for each in known.values()] and not any(
-        [each.differs for each in known.values()]
-    ):
+    by_velocities = NEWTON_EULER in [each.formulation for each in known.values()]
+    if by_velocities and not any([each.differs for each in known.values()]):
         return lambda graph: derivative_class
 
     def classes(graph: Graph) -> Callable[[Node], str]:

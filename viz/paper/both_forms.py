@@ -12,6 +12,7 @@ from dynamics.equations.state_equation import state_equation
 from dynamics.systems.model import Model, as_system
 
 LAGRANGE, HAMILTON, VELOCITIES_ALONE = "state equation", "Hamilton's equations", "velocities alone"
+SIZES = ("nodes", "edges", "depth", "width")
 
 
 class Agreement(NamedTuple):
@@ -35,6 +36,11 @@ def form_sizes(forms: Mapping[str, Graph]) -> dict[str, Counts]:
     hamilton = forms[HAMILTON]
     velocities = Graph(hamilton.inputs, {name: node for name, node in hamilton.outputs.items() if name[0] == "q"})
     return {name: graph.counts() for name, graph in {**forms, VELOCITIES_ALONE: velocities}.items()}
+
+
+def size_of(counts: Counts) -> dict[str, int]:
+    """{"nodes": .., "edges": .., "depth": .., "width": ..}."""
+    return {size: getattr(counts, size) for size in SIZES}
 
 
 def form_agreement(model: Model, forms: Mapping[str, Graph], at: Mapping[str, float]) -> Agreement:

@@ -9,7 +9,7 @@ from .. import theme
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.levels import LevelPanel, Scale, levels_svg, silhouettes_svg
 from ..pages.document import Block, Paragraph, Picture, Table
-from .both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
+from .both_forms import HAMILTON, LAGRANGE, SIZES, VELOCITIES_ALONE, both_forms, form_sizes, size_of
 from .mechanisms import binary_tree, chain, turned_arm
 from .part import Part, drawn
 
@@ -34,7 +34,6 @@ SILHOUETTES = (
     "operation on the longest path to a node, as wide as there are nodes on it: areas are numbers of nodes, in the "
     "colors of Figure 7. Towers that are high and narrow leave a machine little to do at the same time."
 )
-SIZES = ("nodes", "edges", "depth", "width")
 
 
 def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
@@ -71,13 +70,9 @@ def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
         Paragraph(_remedy(orders)),
         drawn("fig7c", silhouettes, SILHOUETTES, "100%", towers),
     ]
-    data = {name: {form: _size(counts) for form, counts in each.items()} for name, each in sizes.items()}
-    data[f"a planar chain of {LINKS}"] = {title: _size(graph.counts()) for title, graph in orders.items()}
+    data = {name: {form: size_of(counts) for form, counts in each.items()} for name, each in sizes.items()}
+    data[f"a planar chain of {LINKS}"] = {title: size_of(graph.counts()) for title, graph in orders.items()}
     return Part("forms", "Figure 7: both forms by depth", blocks, {"forms": data})
-
-
-def _size(counts: Counts) -> dict[str, int]:
-    return {size: getattr(counts, size) for size in SIZES}
 
 
 def _rows(sizes: Mapping[str, Mapping[str, Counts]]) -> list[tuple[str, ...]]:

@@ -75,13 +75,17 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
         text = f"at all states seen next to nothing is new of {' and '.join(small)}: kept, and may hold the motion"
         warnings.warn(text, ConstraintWarning, stacklevel=2)
     dropped = [name for k, name in enumerate(constraints.names) if k not in kept and acting[k]]
-    if dropped:
-        names = " and ".join(map(repr, dropped))
-        one = len(dropped) == 1
-        verbs = "follows from the others and is" if one else "follow from the others and are"
-        text = f"constraint{'' if one else 's'} {names} {verbs} left out"
-        warnings.warn(text, ConstraintWarning, stacklevel=2)
+    warn_that_they_follow([repr(name) for name in dropped], "left out")
     return tuple(kept)
+
+
+def warn_that_they_follow(rows: Sequence[str], then: str, nearly: str = "") -> None:
+    """A ConstraintWarning on rows, if there are any, that follow from others.  then: what is done about them."""
+    one = len(rows) == 1
+    verbs = "follows from the others and is" if one else "follow from the others and are"
+    text = f"constraint{'' if one else 's'} {' and '.join(rows)} {nearly}{verbs} {then}"
+    if rows:
+        warnings.warn(text, ConstraintWarning, stacklevel=3)
 
 
 def _independent(matrices: Sequence[Array], better: float = np.inf) -> dict[int, float]:

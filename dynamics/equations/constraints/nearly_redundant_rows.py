@@ -5,7 +5,6 @@ entries of that size alone, and hold it still. Scaled by itself such a row is as
 loop it is seen to be no more than the rounding of numbers in a file.
 """
 
-import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import NamedTuple
@@ -15,7 +14,7 @@ import numpy as np
 from cgraph._shared import Array
 
 from ...systems.constraints import ConstraintError, Constraints
-from .constraint_rank import DEPENDENT, ConstraintWarning, independent_rows
+from .constraint_rank import DEPENDENT, independent_rows, warn_that_they_follow
 from .row_numbers import RowNumbers, equilibrated, factors, row_numbers
 
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
@@ -131,17 +130,11 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
         (dropped, "left out; a smaller tolerance of the Loop keeps {}"),
         (close, "kept: {} may hold the motion"),
     ):
-        if rows:
-            one = len(rows) == 1
-            listed = " and ".join(
-                [
-                    f"{names[k]!r} ({shares[k]:.1e} of it is new, open by up to {gaps[k]:.1e}{_unit(constraints, k)})"
-                    for k in rows
-                ]
-            )
-            verbs = "nearly follows from the others and is" if one else "nearly follow from the others and are"
-            text = f"constraint{'' if one else 's'} {listed} {verbs} {what.format('it' if one else 'them')}"
-            warnings.warn(text, ConstraintWarning, stacklevel=2)
+        listed = [
+            f"{names[k]!r} ({shares[k]:.1e} of it is new, open by up to {gaps[k]:.1e}{_unit(constraints, k)})"
+            for k in rows
+        ]
+        warn_that_they_follow(listed, what.format("it" if len(rows) == 1 else "them"), "nearly ")
     return constraints.without({k: float(gaps[k]) for k in dropped}) if dropped else constraints
 
 

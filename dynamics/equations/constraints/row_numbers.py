@@ -230,11 +230,12 @@ row_numbers = kept_by_first(RowNumbers)
 
 def _numbers(graph: Graph, point: Mapping[str, float]) -> tuple[float, ...]:
     """The outputs at a point, {input: number}, by generated Python: hundreds of points follow one another."""
-    return _compiled(graph).values([point[name] for name in graph.input_names])
+    return in_python(graph).values([point[name] for name in graph.input_names])
 
 
 @kept_by_first
-def _compiled(graph: Graph) -> cg.Compiled:
+def in_python(graph: Graph) -> cg.Compiled:
+    """The graph as a function of one state, by generated Python."""
     return cg.compile(graph, "python")
 
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import require_choice
-from cgraph.extend import TANGENT, Builder, building, cotangents, folded, tangents, topological
+from cgraph.extend import TANGENT, Builder, building, cotangents, folded, topological
 
-from ...systems.kinematics import ONE, ZERO
+from ...systems.kinematics import ONE, changes, dot
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..bias_terms import along_motion, bias_terms, state_rate
@@ -67,10 +67,7 @@ def chain_rule_literal(system: System) -> LagrangeTerms:
         partials = cotangents({p: ONE}, list(x_dot))  # grad_x p, 2n nodes
         with building(Builder()) as labelled:
             labelled(p.label.derived(TANGENT))
-            total = ZERO
-            for partial, dot in zip(partials, x_dot.values(), strict=True):
-                total = total + partial * dot
-        rate.append(total)
+            rate.append(dot(partials, list(x_dot.values())))
     return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
 
 
@@ -211,8 +208,7 @@ class Embedding:
     ) -> LagrangeTerms:
         """d/dt as the derivative with respect to dt, or along `x_dot`; and to t if the Lagrangian has it."""
         time = {self.system.t: ONE} if self.system.t in self.system.extra_inputs else {}
-        dots = tangents({**(x_dot or {self.dt: ONE}), **time}, momentum)
-        rate = [dots.get(p, ZERO) for p in momentum]
+        rate = changes({**(x_dot or {self.dt: ONE}), **time}, momentum)
         slopes = self.system.kinematics.slopes(gradient, momentum, Builder())
         if self.system.kinematics.quasi is not None:
             slopes = self.embed(*slopes)

@@ -34,7 +34,6 @@ def before_step(system: System, at: Mapping[str, float], after: Mapping[str, flo
 def _moved(system: System, at: Mapping[str, float], qd: Mapping[str, float]) -> list[float]:
     """The rates G(q_old) qd."""
     rates = Graph([*system.q, *system.qd], {f"q{i}": rate for i, rate in enumerate(system.q_dot)})
-    state = {f"q{i}": at[f"q{i}_old"] for i in range(system.nq)} | {
-        name: qd[name] for name in rates.input_names[system.nq :]
-    }
+    state = {f"q{i}": at[f"q{i}_old"] for i in range(system.nq)}
+    state |= {name: qd[name] for name in rates.input_names[system.nq :]}
     return [float(rate) for rate in rates.evaluate(state).values()]

@@ -15,11 +15,7 @@ from cgraph.extend import Builder, SingularError, building, topological
 from ...systems.constraints import ConstraintError
 from ...systems.system import System
 from ..bias_terms import BiasTerms, bias_terms
-from ..constraints.constraints import (
-    constraint_rows,
-    multiplier_outputs,
-    unknown_names,
-)
+from ..constraints.constraints import constraint_rows, multiplier_outputs, unknown_names
 from .singular_mass_matrix import TORQUE, SingularMassMatrixError, coordinate_sizes, no_inertia, require_inertia
 
 DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build

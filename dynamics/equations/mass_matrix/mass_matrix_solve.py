@@ -6,15 +6,7 @@ from typing import NamedTuple, TypeVar
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import (
-    OPS,
-    Builder,
-    SingularError,
-    building,
-    cotangents,
-    folded,
-    topological,
-)
+from cgraph.extend import OPS, Builder, SingularError, building, cotangents, folded, topological
 
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System

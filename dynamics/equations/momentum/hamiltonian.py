@@ -9,11 +9,11 @@ from cgraph import Graph, Node
 from cgraph._shared import Order, require_choice, require_flag, require_whole
 from cgraph.extend import Builder, building, cotangents
 
-from ...systems.kinematics import ONE, ZERO
+from ...systems.kinematics import ONE, ZERO, dot
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import Equation, Output, called, shortened
-from .legendre import Legendre, dot
+from .legendre import Legendre
 
 ITERATIONS = 40  # Newton's, for a Lagrangian that is not quadratic in the velocities
 

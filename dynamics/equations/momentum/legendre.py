@@ -11,14 +11,11 @@ from cgraph._shared import Order, solve_tangents
 from cgraph.extend import Builder, SingularError, building, cotangents, folded, topological
 
 from ...systems.constraints import ConstraintError
-from ...systems.kinematics import ONE, ZERO
+from ...systems.kinematics import ONE, ZERO, dot
 from ...systems.system import System
 from ..mass_matrix.singular_mass_matrix import SingularMassMatrixError, no_inertia, require_inertia
 
-SHORTER_SHARE, LONGER_SHARE = (
-    1.0 / 16.0,
-    2.0,
-)  # times the share of Newton's step after one that went too far, and after a good one
+SHORTER_SHARE, LONGER_SHARE = 1.0 / 16.0, 2.0  # times the share of a step, after one too far and a good one
 OVERSHOOT = 0.5  # of a slope at the start of a step, the other way at its end, and the step went too far
 SETTLED = 1e-16  # step M step over u (p - b) where the step is 1e-8 of the velocities: the next one is rounding
 
@@ -156,14 +153,6 @@ def _chosen(condition: Node, new: list[Node], old: list[Node]) -> list[Node]:
 def is_quadratic(system: System) -> bool:
     """Whether L is quadratic in the velocities, so that they need no iteration."""
     return system.body_terms is not None or Legendre(system, Builder(), 1).quadratic
-
-
-def dot(a: Sequence[Node], b: Sequence[Node]) -> Node:
-    """The sum of products, 0 of none."""
-    total = ZERO
-    for x, y in zip(a, b, strict=True):
-        total = total + x * y
-    return total
 
 
 def linear_nodes(output: Node, variables: Sequence[Node]) -> list[Node]:

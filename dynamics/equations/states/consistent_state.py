@@ -67,9 +67,8 @@ def consistent_state(
     before, velocity = start[system.nq :], state[system.nq :]
     lengths = np.array([length or 1.0 for length in system.lengths[system.nq :]])  # 0 is no known length
     change = lengths * np.abs(velocity - before)
-    if change.max(initial=0.0) > VELOCITY_ROUNDING * (lengths * np.maximum(np.abs(before), np.abs(velocity))).max(
-        initial=0.0
-    ):
+    sizes = lengths * np.maximum(np.abs(before), np.abs(velocity))
+    if change.max(initial=0.0) > VELOCITY_ROUNDING * sizes.max(initial=0.0):
         k = int(change.argmax())
         text = f"velocity {system.velocities[k]!r} from {before[k]:.3g} to {velocity[k]:.3g}"
         warnings.warn(f"{MOVED}, the most {text}", ConstraintWarning, stacklevel=2)

@@ -13,7 +13,8 @@ from cgraph._shared import Array, or_nearest, real_array
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model
 from ..constraints.projection import projected_start
-from ..state_equation import normalization, normalizer, state_inputs
+from ..constraints.row_numbers import in_python
+from ..state_equation import normalization, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
 
@@ -138,7 +139,7 @@ def normalized(model: Model, x: Array) -> Array:
     if graph is None:
         return x
     if x.ndim == 1:
-        one = normalizer(graph)
+        one = in_python(graph)
         result = one(one(x))  # of a length that is far from 1, the first time is rounded
     else:
         columns = list(np.moveaxis(x, -1, 0))

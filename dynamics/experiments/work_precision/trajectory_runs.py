@@ -5,7 +5,6 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,14 +115,8 @@ class Ours(Solver):
         self.order = self.method.order
         self.kind = CHOSEN if self.method.adaptive else EQUAL
 
-    @cached_property
-    def _plain(self) -> CompiledSteps:
-        return compile_steps(step_program(self.problem, self.method, dense=False), "auto", True)
-
-    @cached_property
-    def _dense(self) -> CompiledSteps:
-        program = step_program(self.problem, self.method, dense=self.method.adaptive)
-        return compile_steps(program, "auto", True)
+    def _compiled(self, dense: bool) -> CompiledSteps:
+        return compile_steps(step_program(self.problem, self.method, dense=dense), "auto", True)
 
     def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> tuple[Steps, Span]:
         t_end = self.task.t_end
@@ -135,17 +128,18 @@ class Ours(Solver):
         """The run to t_end, without dense output."""
         if self.kind == EQUAL and self._at_least(knob) > LONGEST_RUN:  # one that does not look at the clock on its way
             return Run(lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s"))
-        compiled, (steps, span) = self._plain, self._options(knob, [self.task.t_end])
+        compiled, (steps, span) = self._compiled(False), self._options(knob, [self.task.t_end])
         return Run(lambda: finished(stepper(compiled, steps), self.start, span))
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
         steps, span = self._options(knob, [self.task.t_end], TRIAL)
-        run, begin = stepper(self._plain, steps), time.perf_counter()
+        run, begin = stepper(self._compiled(False), steps), time.perf_counter()
         finished(run, self.start, span)
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
         steps, span = self._options(knob, self.task.times)
-        return recorded(stepper(self._dense if span.has_inner_times else self._plain, steps), self.start, span)
+        dense = self.method.adaptive and span.has_inner_times
+        return recorded(stepper(self._compiled(dense), steps), self.start, span)

@@ -151,10 +151,7 @@ def parallel_axis(inertia: Array, mass: float | Node, offset: Array) -> Array:
 
 def total(terms: Sequence[Node]) -> Node:
     """The sum of nodes, 0 for none."""
-    result = ZERO
-    for term in terms:
-        result = result + term
-    return result
+    return sum(terms, ZERO)
 
 
 def dot(a: Triple, b: Triple) -> Node:

@@ -245,8 +245,6 @@ def checked(body: Body) -> Body:
 
     Parameters are nodes, among the floats of arrays of objects; what their values must be is not seen here.
     """
-    if not isinstance(body, Body):
-        raise MechanismError(f"bodies must be of the type Body, got {type(body).__name__}: {body!r:.60}")
     checked_name("a body", body.name)
     if body.name == WORLD:
         raise MechanismError(f"a body needs a name other than {WORLD!r}")

@@ -34,7 +34,7 @@ _PER_PART: dict[str, Callable[[str, object], Any]] = {**_NUMBERS, "limits": chec
 
 def parts_of(body: Body) -> list[Body]:
     """The bodies that a body on a composed joint is, the first on its parent, the last itself; of others itself."""
-    if not isinstance(body, Body) or not isinstance(body.joint, Joint) or body.joint.kind not in COMPOSITIONS:
+    if not isinstance(body.joint, Joint) or body.joint.kind not in COMPOSITIONS:
         return [body]
     where, joint, chain = f"body {body.name!r}", body.joint, COMPOSITIONS[body.joint.kind]
     _check_placement(where, joint)

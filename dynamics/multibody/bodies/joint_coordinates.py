@@ -39,13 +39,6 @@ def places(bodies: Sequence[Body]) -> list[Places]:
     return result
 
 
-def parts(
-    bodies: Sequence[Body], q: Sequence[Value], u: Sequence[Value]
-) -> list[tuple[Sequence[Value], Sequence[Value]]]:
-    """The coordinates and the velocities of the joint of each body."""
-    return [(q[place.q], u[place.u]) for place in places(bodies)]
-
-
 def coordinate_names(bodies: Sequence[Body]) -> tuple[str, ...]:
     """Names of all coordinates: the joint's, with a word for the coordinate where it has several."""
     return tuple([_called(body, name) for body in bodies for name in body.joint.type.coordinates])
@@ -123,21 +116,16 @@ def quasi_velocities(bodies: Sequence[Body]) -> QuasiVelocities | None:
     if all([_are_rates(kind) for kind in {*types}]):
         return None
     groups = [place.q.start + group for kind, place in zip(types, places(bodies), strict=True) for group in kind.groups]
-    rate, structure, normalized = (partial(each, bodies) for each in (_rate, _structure, _normalized))
+    rate, structure, normalized = (
+        partial(_of_joints, bodies, *each) for each in (("rate", "qu"), ("structure", "uu"), ("normalized", "q"))
+    )
     return QuasiVelocities(velocity_names(bodies), rate, structure, neutral(bodies), normalized, groups)
 
 
-def _rate(bodies: Sequence[Body], q: Sequence[Node], u: Sequence[Node]) -> list[Node]:
-    return [
-        node for body, (x, v) in zip(bodies, parts(bodies, q, u), strict=True) for node in body.joint.type.rate(x, v)
-    ]
-
-
-def _structure(bodies: Sequence[Body], u: Sequence[Node], p: Sequence[Node]) -> list[Node]:
-    joints = [(body.joint.type, place.u) for body, place in zip(bodies, places(bodies), strict=True)]
-    return [node for kind, at in joints for node in kind.structure(u[at], p[at])]
-
-
-def _normalized(bodies: Sequence[Body], q: Sequence[Node]) -> list[Node]:
-    joints = [(body.joint.type, place.q) for body, place in zip(bodies, places(bodies), strict=True)]
-    return [node for kind, at in joints for node in kind.normalized(q[at])]
+def _of_joints(bodies: Sequence[Body], what: str, kinds: str, *values: Sequence[Node]) -> list[Node]:
+    """What a function of the joint's type makes of its part of each of the values, of coordinates q or velocities u."""
+    result: list[Node] = []
+    for body, place in zip(bodies, places(bodies), strict=True):
+        own = [all_of[getattr(place, kind)] for all_of, kind in zip(values, kinds, strict=True)]
+        result += getattr(body.joint.type, what)(*own)
+    return result

@@ -12,7 +12,7 @@ import numpy as np
 from cgraph import Node
 from cgraph._shared import real_number
 
-from ...systems.arguments import coefficients, parameter_items, parameter_value, sequence
+from ...systems.arguments import coefficients, parameters_of, sequence
 from ..bodies.body import WORLD, Body, Joint
 from ..parameters import Quantity, bound, symbol
 from ..trees.mechanism import Mechanism
@@ -82,7 +82,7 @@ def planar_arm(
         raise ValueError(f"an arm needs as many masses as lengths, at least one; got {len(masses)} and {len(lengths)}")
     if not isinstance(mass_model, str) or mass_model not in ("rod", "point"):
         raise ValueError(f'mass_model must be "rod" or "point", got {mass_model!r}')
-    values = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
+    values = parameters_of(parameters)
     rods = [
         (_positive(f"link {i}: mass", mass, "kg", values), _positive(f"link {i}: length", length, "m", values))
         for i, (mass, length) in enumerate(zip(masses, lengths, strict=True), 1)

@@ -7,16 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph._shared import (
-    check_name,
-    counted,
-    real_number,
-    require_flag,
-    require_graph,
-    require_mapping,
-    require_sequence,
-)
+from cgraph import Graph, _shared
 
 from ...equations.formulations.formulations import inverse_dynamics, size
 from ...equations.formulations.lagrange_terms import SMALL, shortest
@@ -55,7 +46,7 @@ class OmittedTerm:
     edges: int
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.why} ({counted(self.nodes, 'node')}, {counted(self.edges, 'edge')})"
+        return f"{self.what}: {self.why} ({_shared.counted(self.nodes, 'node')}, {_shared.counted(self.edges, 'edge')})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +145,7 @@ class _Step:
 
     def _graph(self, equations: Equations) -> Graph:
         graph = equations(self.model)
-        require_graph("prune, as what equations(model) gives,", graph)
+        _shared.require_graph("prune, as what equations(model) gives,", graph)
         if not self.values and self.outputs is None:
             return graph
         return cg.specialize(graph, _bound(graph, self.values), self.outputs)
@@ -212,7 +203,7 @@ def prune(
     (50, 10)
     """
     model = as_mechanism(model) or as_system(model)
-    kept = require_sequence("effects", effects, "names", str)
+    kept = _shared.require_sequence("effects", effects, "names", str)
     if not callable(equations) or isinstance(equations, type):
         raise TypeError(f"equations must be a function of a model, got {type(equations).__name__}: {equations!r:.60}")
     if unknown := [each for each in kept if each not in EFFECTS]:
@@ -223,7 +214,7 @@ def prune(
         as_system(model).require_values(known | {name: value for name, value in numbers.items() if name in known})
     steps = _steps(model, kept, _mapping("lock", lock), numbers, outputs)
     graph = steps[-1].graph(equations)
-    fewer = _regrouped(steps[-1]) if require_flag("regroup", regroup) else None
+    fewer = _regrouped(steps[-1]) if _shared.require_flag("regroup", regroup) else None
     if fewer is not None and len((candidate := fewer.graph(equations)).nodes) < len(graph.nodes):
         steps.append(fewer)
         graph = candidate
@@ -232,8 +223,11 @@ def prune(
 
 def _mapping(what: str, given: Mapping[str, float] | None) -> dict[str, float]:
     """The numbers of a mapping by name; none for None."""
-    chosen = {} if given is None else require_mapping(what, given, "name: number")
-    return {check_name(what, name): real_number(f"{what}: {name!r}", value) for name, value in chosen.items()}
+    chosen = {} if given is None else _shared.require_mapping(what, given, "name: number")
+    return {
+        _shared.check_name(what, name): _shared.real_number(f"{what}: {name!r}", value)
+        for name, value in chosen.items()
+    }
 
 
 def _regrouped(step: _Step) -> _Step | None:
@@ -267,7 +261,7 @@ def _steps(
         known = {**steps[-1].values, name: value}
         steps.append(replace(steps[-1], what=f"input {name}", why=f"is {value:g}", values=known))
     if outputs is not None:
-        outputs = list(require_sequence("outputs", outputs, "names", str))
+        outputs = list(_shared.require_sequence("outputs", outputs, "names", str))
         why = f"only {', '.join(outputs)} asked for"
         steps.append(replace(steps[-1], what="other outputs", why=why, outputs=tuple(outputs)))
     return steps
@@ -287,4 +281,4 @@ def _saved(before: Graph, after: Graph) -> tuple[int, int]:
 
 
 def _size(graph: Graph) -> str:
-    return f"{counted(len(graph.nodes), 'node')} and {counted(len(graph.edges), 'edge')}"
+    return f"{_shared.counted(len(graph.nodes), 'node')} and {_shared.counted(len(graph.edges), 'edge')}"

@@ -93,7 +93,7 @@ class JointForce(ABC):
             raise MechanismError(f"{where}: {what} must be finite{bound}, got {number!r}")
 
     def _require_axis(self, body: Body) -> None:
-        if len(body.joint.type.coordinates) != 1:
+        if len(body.joint.neutral) != 1:
             raise MechanismError(
                 f"{type(self).__name__} acts on joints of one coordinate, and that of body {body.name!r} is "
                 f"{body.joint.kind}"
@@ -292,8 +292,7 @@ def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
         raise MechanismError(f"there is a force on the joint of the unknown body {force.body!r:.80}")
     body = named[force.body]
     if body.joint.kind in COMPOSITIONS:
-        acts = f"{type(force).__name__} acts on joints of one coordinate"
-        raise MechanismError(f"{acts}, and that of body {body.name!r} is {body.joint.kind}")
+        force._require_axis(body)
     if not body.joint.type.moves:
         raise MechanismError(f"there is a force on the joint of body {body.name!r}, which does not move")
     force.check(body)

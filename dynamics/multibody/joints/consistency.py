@@ -5,11 +5,11 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import Array, memo
-from cgraph.extend import Builder, building, tangents
+from cgraph.extend import Builder, building
 
-from ...systems.kinematics import Kinematics
+from ...systems.kinematics import Kinematics, changes
 from ...systems.quasi_velocities import QuasiVelocities
-from ..algebra.spatial import ZERO, cross
+from ..algebra.spatial import cross
 from ..algebra.turns import UNIT
 from .joint_type import JointType
 
@@ -33,8 +33,7 @@ def contradiction(joint: JointType) -> str:
         turned = [node for axis in UNIT for node in turn.out(cross(velocity.angular, axis))]  # R (w x e)
         moved = [*turned, *turn.out(velocity.linear)]
         given, derived = joint.acceleration(q, u), JointType.acceleration(joint, q, u)
-    dots = tangents(dict(zip(q, rate, strict=True)), placed, build)
-    rates = [dots.get(node, ZERO) for node in placed]
+    rates = changes(dict(zip(q, rate, strict=True)), placed, build)
     claims: list[tuple[str, list[Node], list[Node]]] = [
         ("velocity must be the rate of its turn and translation, along the rates of its coordinates", rates, moved),
         ("velocity must be linear in u", [*both.angular, *both.linear], [*apart.angular, *apart.linear]),

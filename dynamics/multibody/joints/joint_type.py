@@ -11,15 +11,15 @@ import numpy as np
 import cgraph as cg
 from cgraph import Node
 from cgraph._shared import Array
-from cgraph.extend import Builder, building, tangents, topological
+from cgraph.extend import Builder, building, topological
 
+from ...systems.kinematics import ONE, changes
 from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple, cross, plus
 from ..algebra.spatial_vectors import Twist
 from ..algebra.turns import MatrixTurn, Turn, about_z
 
 NodeMatrix = Sequence[Sequence[Node]]  # (3, 3), rows
-ONE = cg.constant(1.0)
 
 
 class JointType(ABC):
@@ -87,11 +87,9 @@ class JointType(ABC):
 
     def acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
         """Acceleration of the body against the joint at constant u: (w_dot, v_dot + w x v) along q_dot = G u."""
-        angular, linear = velocity = self.velocity(q, u)
+        angular, linear = self.velocity(q, u)
         moving = {x: dot for x, dot in zip(q, self.rate(q, u), strict=True) if x.value is None}
-        dots = tangents(moving, [*angular, *linear])
-        rates = [[dots.get(node, ZERO) for node in part] for part in velocity]
-        (a, b, c), (x, y, z) = rates
+        a, b, c, x, y, z = changes(moving, [*angular, *linear])
         return Twist((a, b, c), plus((x, y, z), cross(angular, linear)))
 
     def columns(self, q: Sequence[Node]) -> list[Twist]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, Names, building, cotangents, folded, tangents
+from cgraph.extend import Builder, Names, building, cotangents, folded
 
 from ...equations.bias_terms import along_motion
 from ...equations.equation import documented
@@ -26,7 +26,7 @@ from ...equations.formulations.lagrange_terms import (
 from ...equations.torque_parts.torque_decomposition import names_of_partials
 from ...equations.torque_parts.torque_table import TorqueTable
 from ...systems.arguments import new_variables
-from ...systems.kinematics import ONE, ZERO
+from ...systems.kinematics import ONE, ZERO, changes
 from ...systems.model import Model, as_system, display_names
 from ...systems.system import System, signed_terms
 from ..changes.switched_effects import without_effect
@@ -136,8 +136,7 @@ def _kinetic(kinetic: Node, system: System, build: Builder) -> tuple[list[Node],
     along = along_motion(system, momentum, build, None)
     with building(build):
         coriolis = [rate - slope for rate, slope in zip(along, slopes, strict=True)]
-    dots = tangents(dict(zip(system.qd, system.qdd, strict=True)), momentum, build)
-    return coriolis, [dots.get(p, ZERO) for p in momentum]
+    return coriolis, changes(dict(zip(system.qd, system.qdd, strict=True)), momentum, build)
 
 
 def _potentials(system: System, mechanism: Mechanism | None, build: Builder) -> Iterator[tuple[str, list[Node]]]:
@@ -151,9 +150,8 @@ def _potentials(system: System, mechanism: Mechanism | None, build: Builder) -> 
     called, seen = display_names(system), dict[str, int]()
     for name, partial in _bodies(system):
         potential = _with(system, partial).potential
-        for sign, node in [
-            each for each in signed_terms(potential) if each[1].value is None
-        ]:  # constants have no slope
+        sloping = [each for each in signed_terms(potential) if each[1].value is None]
+        for sign, node in sloping:
             term = node if sign > 0 else -node
             text = Names(Graph([*system.q, *system.extra_inputs], {"P": term}), called).text(term, LONGEST_TERM)
             cause = f"potential {text}" if "%" not in text else "potential"
@@ -175,9 +173,8 @@ def _of_forces(system: System, mechanism: Mechanism | None, build: Builder) -> I
         together: dict[str, list[Force | JointForce | Contact]] = {}
         for force in mechanism.forces:
             kind = type(force).__name__.removeprefix("Joint").lower()
-            together.setdefault(f"{kind} {'of' if isinstance(force, JointForce) else 'on'} {force.body}", []).append(
-                force
-            )
+            name = f"{kind} {'of' if isinstance(force, JointForce) else 'on'} {force.body}"
+            together.setdefault(name, []).append(force)
         forces = {name: tuple(_along_velocities(mechanism, each)) for name, each in together.items()}
     for name, given in forces.items():
         with building(build):
@@ -205,8 +202,7 @@ def _of_step(
     for name, partial in _bodies(system):
         one = _with(system, partial)
         torques = through_step(one, THROUGH_STEP[formulation](one), through)
-        dots = tangents({through: ONE}, torques, build)
-        rows[_of(SPURIOUS, name)] = folded([dots.get(each, ZERO) for each in torques], build, {through: ZERO})
+        rows[_of(SPURIOUS, name)] = folded(changes({through: ONE}, torques, build), build, {through: ZERO})
         held = folded(torques, build, {through: ZERO})
         with building(build):
             rest = [total + each for total, each in zip(rest, held, strict=True)]

@@ -96,11 +96,10 @@ def rigid(link: Link) -> Inertia:
 def mass_matrix_columns(bodies: Sequence[PlacedLink], n: int) -> list[list[Node]]:
     """The lower triangle of M, (n, n), rows.  bodies: parents first, with armatures."""
     lower = [[ZERO] * (i + 1) for i in range(n)]
-    ways = [bodies, [body._replace(plane=None, before=None) for body in bodies]]
-    filled = []
-    for way in (
-        ways if any([body.plane for body in bodies]) else ways[:1]
-    ):  # a short chain in a plane takes less with its bodies' axes than with the plane's
+    ways, filled = [bodies], []
+    if any([body.plane for body in bodies]):  # a short chain in a plane takes less with its bodies' axes
+        ways.append([body._replace(plane=None, before=None) for body in bodies])
+    for way in ways:
         columns = _columns(way, lower)
         filled.append(_by_bodies(way, columns, [list(row) for row in lower]))
         if _longest(bodies) > FEW_FREEDOMS:

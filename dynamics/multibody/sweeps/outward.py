@@ -230,6 +230,18 @@ def propagate_acceleration(parent: Acceleration, before: Motion, after: Motion, 
     return Acceleration(angular, linear, tensor, swept, parent.tags)
 
 
+def wrenches(states: Sequence[LinkState], motions: Sequence[Motion]) -> list[BiasForce]:
+    """The wrenches of all links, parents first.  motions: theirs, and that of the world last."""
+    forces, accelerations = list[BiasForce](), list[Acceleration]()
+    base = base_acceleration(motions[-1])
+    for at, motion in zip(states, motions, strict=False):
+        with cg.tag(at.name):
+            parent = accelerations[at.parent] if at.parent >= 0 else base
+            accelerations.append(propagate_acceleration(parent, motions[at.parent], motion, at))
+            forces += wrench(accelerations[-1], motion, at)
+    return forces
+
+
 def wrench(acceleration: Acceleration, motion: Motion, at: LinkState) -> list[BiasForce]:
     """The wrench, each component paired with the velocity it works on; the spring's and the armature's force likewise.
 

@@ -44,7 +44,7 @@ class SubtreeMomentum(NamedTuple):
             return SubtreeMomentum(mass, moment, self.momentum.plus(other.momentum))
 
 
-def body_momentum(motion: Motion, link: Link) -> SubtreeMomentum:
+def _body_momentum(motion: Motion, link: Link) -> SubtreeMomentum:
     """Momentum of the body alone, f = m v + w x h, n = J w + h x v; in a plane f alone, as n_z is one of p."""
     h, w, v, mass = motion.out(link.moment), motion.omega, motion.velocity, as_node(link.mass)
     with cg.tag(KINETIC):
@@ -55,7 +55,7 @@ def body_momentum(motion: Motion, link: Link) -> SubtreeMomentum:
     return SubtreeMomentum(mass, h, Wrench(torque, force))
 
 
-def with_known_momenta(composite: SubtreeMomentum, at: LinkState, p: Sequence[Node]) -> SubtreeMomentum:
+def _with_known_momenta(composite: SubtreeMomentum, at: LinkState, p: Sequence[Node]) -> SubtreeMomentum:
     """Momentum with the momenta p of the joint's velocities in place of the shares of (n, f) that they are."""
     torque, force = list(composite.momentum.torque), list(composite.momentum.force)
     own = [momentum - at.link.armature * velocity for momentum, velocity in zip(p, at.u, strict=True)]
@@ -69,7 +69,28 @@ def with_known_momenta(composite: SubtreeMomentum, at: LinkState, p: Sequence[No
     return composite._replace(momentum=Wrench((torque[0], torque[1], torque[2]), (force[0], force[1], force[2])))
 
 
-def momentum_rates(
+def momentum_rates(states: Sequence[LinkState], motions: Sequence[Motion], p: Sequence[Node]) -> list[Node]:
+    """The rates of the momenta p of all links, parents first, without applied forces.
+
+    motions: those of the links, and that of the world last.
+    """
+    composites: list[SubtreeMomentum] = []
+    for at, motion in zip(states, motions, strict=False):
+        with cg.tag(at.name, COMPOSITE):
+            composites.append(_body_momentum(motion, at.link))
+    rates = list[Node]()
+    for i, at in reversed(list(enumerate(states))):
+        own = p[at.first : at.first + len(at.u)]
+        with cg.tag(at.name, COMPOSITE):
+            composites[i] = _with_known_momenta(composites[i], at, own)
+            rates[:0] = _own_rates(composites[i], motions[at.parent], motions[i], at, own)
+            if at.parent >= 0:
+                carried = _about_parent(composites[i], motions[at.parent], motions[i], at)
+                composites[at.parent] = composites[at.parent].plus(carried)
+    return rates
+
+
+def _own_rates(
     composite: SubtreeMomentum, parent: Motion, motion: Motion, at: LinkState, p: Sequence[Node]
 ) -> list[Node]:
     """The rates of the momenta p of a joint's velocities, without applied forces; the spring's among them."""
@@ -93,7 +114,7 @@ def momentum_rates(
         return [rate - spring for rate, spring in zip(rates, springs, strict=True)]
 
 
-def about_parent(composite: SubtreeMomentum, parent: Motion, motion: Motion, at: LinkState) -> SubtreeMomentum:
+def _about_parent(composite: SubtreeMomentum, parent: Motion, motion: Motion, at: LinkState) -> SubtreeMomentum:
     """Momentum about the parent's origin, in the axes of the parent's motion."""
     stays, offset = parent.keeps(at), parent.out(at.place)
     back = motion.turn.reversed  # not `out`, for the sake of products that other equations have as well

@@ -21,24 +21,8 @@ from ..sweeps.base_parameters import base_parameter_links, without_axial_moments
 from ..sweeps.equation_links import equation_links
 from ..sweeps.links import Link, LinkState, link, link_states
 from ..sweeps.mass_matrix import PlacedLink, mass_matrix_columns, size_of
-from ..sweeps.outward import (
-    Acceleration,
-    Motion,
-    base_acceleration,
-    energy,
-    ground,
-    motions,
-    propagate_acceleration,
-    wrench,
-)
-from ..sweeps.subtree_momentum import (
-    COMPOSITE,
-    SubtreeMomentum,
-    about_parent,
-    body_momentum,
-    momentum_rates,
-    with_known_momenta,
-)
+from ..sweeps.outward import Motion, base_acceleration, energy, ground, motions, wrenches
+from ..sweeps.subtree_momentum import momentum_rates
 from .structure import Structure
 
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
@@ -152,17 +136,9 @@ class TreeEquations:
 
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> list[BiasForce]:
         """The wrenches of all bodies at these accelerations, with the velocities that they work on."""
-        forces, accelerations = list[BiasForce](), list[Acceleration]()
         with building(Builder()):
-            base = base_acceleration(self.ground)
             states = self.states(q, qd, self._fewest, qdd)
-            found = self._motions(states)
-            for at, motion in zip(states, found, strict=False):
-                with cg.tag(at.name):
-                    parent = accelerations[at.parent] if at.parent >= 0 else base
-                    accelerations.append(propagate_acceleration(parent, found[at.parent], motion, at))
-                    forces += wrench(accelerations[-1], motion, at)
-        return forces
+            return wrenches(states, self._motions(states))
 
     def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
         """The lower triangle of M by composite inertias; or from the Lagrangian, where that takes fewer nodes."""
@@ -188,21 +164,7 @@ class TreeEquations:
             return None
         with building(Builder()):
             states = self.states(q, qd, self._fewest)
-            found = self._motions(states)
-            composites: list[SubtreeMomentum] = []
-            for at, motion in zip(states, found, strict=False):
-                with cg.tag(at.name, COMPOSITE):
-                    composites.append(body_momentum(motion, at.link))
-            rates = list[Node]()
-            for i, at in reversed(list(enumerate(states))):
-                own = p[at.first : at.first + len(at.u)]
-                with cg.tag(at.name, COMPOSITE):
-                    composites[i] = with_known_momenta(composites[i], at, own)
-                    rates[:0] = momentum_rates(composites[i], found[at.parent], found[i], at, own)
-                    if at.parent >= 0:
-                        carried = about_parent(composites[i], found[at.parent], found[i], at)
-                        composites[at.parent] = composites[at.parent].plus(carried)
-        return rates
+            return momentum_rates(states, self._motions(states), p)
 
     def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives | None:
         """Torques of all bodies, with their springs, and their derivatives."""

@@ -26,7 +26,8 @@ class HeyokaPeer(Peer):
         if case.system.kinematics.quasi is not None:
             raise UnavailableError("is measured on velocities that are rates of coordinates")
         self.heyoka = heyoka()
-        leave_cache(self.heyoka)
+        if hasattr(self.heyoka.llvm_state, "set_diskcache_enabled"):
+            self.heyoka.llvm_state.set_diskcache_enabled(False)  # where a second run finds what the first one compiled
         self.functions: dict[str, Callable[..., object]] = {}
 
     def prepare(self, task: str, mode: str) -> TimedTask:
@@ -41,12 +42,6 @@ class HeyokaPeer(Peer):
 def heyoka() -> ModuleType:
     """The module. Raises ImportError naming the extra when it is not installed."""
     return required("heyoka", "heyoka")
-
-
-def leave_cache(hy: ModuleType) -> None:
-    """Let this process compile all by itself; else a second run finds on disk what the first one has compiled."""
-    if hasattr(hy.llvm_state, "set_diskcache_enabled"):
-        hy.llvm_state.set_diskcache_enabled(False)
 
 
 def expressions(case: PeerModel, task: str) -> tuple[list[expression], list[expression]]:

@@ -74,9 +74,6 @@ class JaxPeer(Peer):
         q, qd, _ = self._split(x)
         return join([self._rate(q, qd), self._forward(join([x, self.np.zeros(self.case.n)]))])
 
-    def _step(self, x: JaxArray) -> JaxArray:
-        return rk4_step(self.rate, x)
-
     def _motion(self, x: JaxArray) -> JaxArray:
         join, n = self.np.concatenate, self.case.n
 
@@ -91,7 +88,7 @@ class JaxPeer(Peer):
         if task in MOTIONS:
             square = self.jax.grad(lambda x: (self._motion(x)[: self.case.n] ** 2).sum())
             return self._motion if task == "motion" else square
-        return {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
+        return {"inverse": self._inverse, "forward": self._forward, "rk4": lambda x: rk4_step(self.rate, x)}[task]
 
     def _slopes(self, function: Callable[[JaxArray], JaxArray]) -> Callable[[JaxArray], JaxArray]:
         """Derivatives of a function, row by row; those by q along the velocities."""

@@ -80,11 +80,8 @@ class Ours(Peer):
 
     def _motion(self) -> TimedTask:
         """The steps as one program, which is fed a row of torques a step."""
-        step, x, n = (
-            step_graph(self.case.bound(state_equation(self.case.model))),
-            self.case.point("motion"),
-            self.case.n,
-        )
+        step = step_graph(self.case.bound(state_equation(self.case.model)))
+        x, n = self.case.point("motion"), self.case.n
         registers = {"x": 2 * n, "tau": n}
         run = runner(Program(registers, [Call(step, ("x", "tau"), ("x",))], record=["x"], feed=["tau"]))
         start, rows = x[: 2 * n], x[2 * n :].reshape(PASSES, n)

@@ -5,6 +5,7 @@ from html import escape
 import numpy as np
 
 from dynamics import System, forward_dynamics, gravity_force
+from dynamics.systems.constraints import Constraints
 
 from ...pages.document import Table
 from ..glossary import term
@@ -77,15 +78,8 @@ def closed_loop(subject: Subject) -> Screen:
 
 def _clamped(system: System) -> System:
     """The system with its last velocity held at zero."""
-    return System(
-        lambda *_: list(system.partial_lagrangians),
-        system.coordinates,
-        system.parameters,
-        forces=lambda *_: list(system.forces),
-        damping=list(system.damping),
-        quasi_velocities=system.kinematics.quasi,
-        velocity_constraints=lambda q, qd, t: [qd[-1]],
-    )
+    clamp = Constraints(system.kinematics, system.t, system.parameters, None, lambda q, qd, t: [qd[-1]])
+    return system.changed(constraints=clamp, extra_inputs=system.extra_inputs)
 
 
 def _choices(force: float, static: float, unit: str) -> tuple[tuple[str, ...], int]:

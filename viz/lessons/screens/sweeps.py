@@ -10,8 +10,9 @@ from html import escape
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import columns, counted
-from cgraph.extend import Names, cotangents, tangents
+from cgraph.extend import Names, cotangents
 from dynamics import inverse_dynamics, momentum
+from dynamics.systems.kinematics import changes
 
 from ...graph_drawing.dot import to_dot
 from ...graph_drawing.levels import levels_of
@@ -257,8 +258,7 @@ def _rates(subject: Subject, graph: Graph) -> dict[Node, float]:
     """Rates of all nodes that are no numbers, by a forward sweep from those of q, q̇ and the time."""
     nodes = [node for node in graph.nodes if node.value is None]
     seeds = {node: cg.constant(subject.rates.get(str(node.name), 0.0)) for node in nodes if not node.args}
-    dots = tangents(seeds, nodes)
-    return _evaluated(subject, graph, {node: dots.get(node, cg.constant(0.0)) for node in nodes})
+    return _evaluated(subject, graph, dict(zip(nodes, changes(seeds, nodes), strict=True)))
 
 
 def _evaluated(subject: Subject, graph: Graph, nodes: Mapping[Node, Node]) -> dict[Node, float]:

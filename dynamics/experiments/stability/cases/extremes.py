@@ -19,87 +19,58 @@ def simple_pendulum(stiffness: float = STIFFNESS) -> System:
 
 def upright(angle: float, name: str, t_end: float, growth: float) -> StabilityCase:
     """Let go at rest, at or next to the upright."""
-    return StabilityCase(
-        name=name,
-        about="an unstable equilibrium: what is there at the start grows by e^(3.13 t)",
-        model=simple_pendulum(),
-        q=(angle,),
-        qd=(0.0,),
-        t_end=t_end,
-        criteria=(energy_criterion(2.0 * STIFFNESS),),
-        size=(math.pi, math.sqrt(STIFFNESS)),
-        growth=growth,
-    )
+    about = "an unstable equilibrium: what is there at the start grows by e^(3.13 t)"
+    size = math.pi, math.sqrt(STIFFNESS)
+    return _pendulum(name, about, (angle, 0.0), t_end, size, growth, energy_criterion(2.0 * STIFFNESS))
 
 
 def large_angle(angle: float) -> StabilityCase:
     """A pendulum that has turned many times already."""
-    ulp = math.ulp(angle)
-    return StabilityCase(
-        name=f"angle of {angle:g} rad",
-        about=f"the angle itself can be told to {ulp:.2g} rad only; sine and cosine must reduce it exactly",
-        model=simple_pendulum(),
-        q=(angle,),
-        qd=(0.0,),
-        t_end=10.0,
-        criteria=(
-            Criterion("error 0", SLACK * max(UNIT, RTOL / angle), "the angle relative to its own size"),
-            Criterion(
-                "energy",
-                max(SLACK * RTOL, 100.0 * ulp),
-                "a rounding of the angle is a change of the potential"
-                if ulp < 1e-3
-                else "an ulp of the angle is 0.1 rad: nothing can be followed, but nothing may run away either",
-                2.0 * STIFFNESS,
-            ),
-        ),
-        size=(angle, math.sqrt(STIFFNESS)),
+    name, ulp = f"angle of {angle:g} rad", math.ulp(angle)
+    about = f"the angle itself can be told to {ulp:.2g} rad only; sine and cosine must reduce it exactly"
+    why = (
+        "a rounding of the angle is a change of the potential"
+        if ulp < 1e-3
+        else "an ulp of the angle is 0.1 rad: nothing can be followed, but nothing may run away either"
     )
+    error = Criterion("error 0", SLACK * max(UNIT, RTOL / angle), "the angle relative to its own size")
+    kept = Criterion("energy", max(SLACK * RTOL, 100.0 * ulp), why, 2.0 * STIFFNESS)
+    return _pendulum(name, about, (angle, 0.0), 10.0, (angle, math.sqrt(STIFFNESS)), None, error, kept)
 
 
 def spinning(velocity: float, growth: float) -> StabilityCase:
     """A pendulum at a high speed, for a thousand radians."""
-    return StabilityCase(
-        name=f"velocity of {velocity:g} rad/s",
-        about="gravity is a small change of a large speed",
-        model=simple_pendulum(),
-        q=(0.5,),
-        qd=(velocity,),
-        t_end=1e3 / velocity,
-        criteria=(Criterion("energy", SLACK * RTOL, "nothing takes energy in or out", 0.5 * velocity**2),),
-        size=(1e3, velocity),
-        growth=growth,
-    )
+    name, about = f"velocity of {velocity:g} rad/s", "gravity is a small change of a large speed"
+    kept = Criterion("energy", SLACK * RTOL, "nothing takes energy in or out", 0.5 * velocity**2)
+    return _pendulum(name, about, (0.5, velocity), 1e3 / velocity, (1e3, velocity), growth, kept)
 
 
 def creeping() -> StabilityCase:
     """The smallest velocity there is, without a force: the angle must neither jump nor be lost."""
-    return StabilityCase(
-        name="smallest velocity",
-        about="products of the velocity vanish; the motion must still be uniform",
-        model=simple_pendulum(0.0),
-        q=(0.0,),
-        qd=(TINY,),
-        t_end=1024.0,
-        criteria=(Criterion("error 1", 0.0, "no force acts: the velocity is exactly the start's"),),
-        size=(1024.0 * TINY, TINY),
-        growth=1.0,
-    )
+    about = "products of the velocity vanish; the motion must still be uniform"
+    exact, size = Criterion("error 1", 0.0, "no force acts: the velocity is exactly the start's"), (1024.0 * TINY, TINY)
+    return _pendulum("smallest velocity", about, (0.0, TINY), 1024.0, size, 1.0, exact, stiffness=0.0)
 
 
 def hanging() -> StabilityCase:
     """The smallest velocity at the lower equilibrium."""
-    return StabilityCase(
-        name="smallest velocity, hanging",
-        about="numbers that underflow everywhere must not become NaN or grow",
-        model=simple_pendulum(),
-        q=(0.0,),
-        qd=(TINY,),
-        t_end=10.0,
-        criteria=(Criterion("error", RTOL, "nothing moves that can be told from rest; sizes are 1 rad and 1 rad/s"),),
-        size=(1.0, 1.0),
-        growth=1.0,
-    )
+    about = "numbers that underflow everywhere must not become NaN or grow"
+    error = Criterion("error", RTOL, "nothing moves that can be told from rest; sizes are 1 rad and 1 rad/s")
+    return _pendulum("smallest velocity, hanging", about, (0.0, TINY), 10.0, (1.0, 1.0), 1.0, error)
+
+
+def _pendulum(
+    name: str,
+    about: str,
+    start: tuple[float, float],
+    t_end: float,
+    size: tuple[float, float],
+    growth: float | None,
+    *criteria: Criterion,
+    stiffness: float = STIFFNESS,
+) -> StabilityCase:
+    model = simple_pendulum(stiffness)
+    return StabilityCase(name, about, model, start[:1], start[1:], t_end, criteria=criteria, size=size, growth=growth)
 
 
 def cases() -> list[StabilityCase]:
