@@ -14,16 +14,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Compiled, Graph
+from cgraph import Compiled, Graph, Node
 from cgraph._shared import Array
 
 from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations.formulations import inverse_dynamics
-from ...multibody.builders.planar_arm import PlanarLink, arm_of_links, planar_arm, planar_links
+from ...multibody.builders.planar_arm import PlanarLink, planar_arm, planar_links
 from ...multibody.trees.mechanism import Mechanism
 from ...multiprecision.decimal_numbers import working
 from ...multiprecision.graph_values import values_in_digits
@@ -168,8 +169,33 @@ class Arms:
 
 def arm_with_parameters(n: int) -> System:
     """A planar arm whose numbers are parameters: mass0.., length0.., center0.., inertia0.., damping0.., g."""
-    p = cg.variables([f"{what}{i}" for what in (*PlanarLink._fields, "damping") for i in range(n)])
-    *columns, damping = [p[k : k + n] for k in range(0, 5 * n, n)]
-    gravity = cg.variable("g")
-    parameters = {str(each.name): 1.0 for each in (*p, gravity)}
-    return arm_of_links(list(zip(*columns, strict=True)), damping, gravity, parameters).system
+
+    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node, p: dict[str, Node]) -> list[Node]:
+        links = [PlanarLink(*[p[f"{what}{i}"] for what in PlanarLink._fields]) for i in range(n)]
+        return by_centers(q, qd, links, p["g"])
+
+    names = [f"{what}{i}" for what in (*PlanarLink._fields, "damping") for i in range(n)]
+    return System(
+        lagrangian,
+        [f"joint {i + 1}" for i in range(n)],
+        dict.fromkeys([*names, "g"], 1.0),
+        forces=lambda q, qd, t, p: [-p[f"damping{i}"] * qd[i] for i in range(n)],
+    )
+
+
+def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[Any], gravity: Node | float) -> list[Node]:
+    """The partial Lagrangians by positions and velocities of the centers of mass, K = m v.v / 2 + I w^2 / 2."""
+    partials: list[Node] = []
+    angle, omega = q[0], qd[0]
+    x, y, height = cg.constant(0.0), cg.constant(0.0), cg.constant(0.0)  # velocity of the joint, and its height
+    for i, link in enumerate(links):
+        if i:
+            angle, omega = angle + q[i], omega + qd[i]
+        s, c = cg.sin(angle), cg.cos(angle)
+        r = link.center
+        u, v = x + r * omega * c, y + r * omega * s
+        kinetic = 0.5 * link.mass * (u * u + v * v) + 0.5 * link.inertia * (omega * omega)
+        partials.append(kinetic - link.mass * gravity * (height - r * c))
+        r = link.length
+        x, y, height = x + r * omega * c, y + r * omega * s, height - r * c
+    return partials

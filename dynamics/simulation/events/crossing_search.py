@@ -35,6 +35,12 @@ DEGREES = 8  # of dense output, whose matrices are kept
 OFTEN = 200  # calls of a graph, which take about as long as to compile it
 ALIKE = 256  # points, that take about as long as a call
 
+NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(FITTED + 1) / FITTED)  # shares of a cell, its ends with them
+# from values there to Bernstein coefficients
+TO_POINTS = np.linalg.inv(
+    [[math.comb(FITTED, k) * s**k * (1.0 - s) ** (FITTED - k) for k in range(FITTED + 1)] for s in NODES.tolist()]
+)
+
 
 class Crossing(NamedTuple):
     """First zero of a quantity."""
@@ -343,21 +349,11 @@ def _ends(points: Array) -> tuple[Array, Array]:
     return points.min(axis=1).T, points.max(axis=1).T
 
 
-@memo(1)
-def _interpolation() -> tuple[Array, Array]:
-    """Shares of a cell, its ends with them, and the matrix from values there to Bernstein coefficients."""
-    s = 0.5 - 0.5 * np.cos(np.pi * np.arange(FITTED + 1) / FITTED)
-    choose = _binomials(FITTED)[0][:, -1]
-    k = np.arange(FITTED + 1)
-    return s, np.asarray(np.linalg.inv(choose * s[:, None] ** k * (1.0 - s[:, None]) ** (FITTED - k)))
-
-
 def _fitted_points(graph: Graph, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array) -> Array:
     """Control points (k, n, degree + 1) of polynomials through the values of quantities on cells."""
-    shares, matrix = _interpolation()
-    s, each = (a[:, None] + (b - a)[:, None] * shares).reshape(-1), np.repeat(rows, len(shares))
+    s, each = (a[:, None] + (b - a)[:, None] * NODES).reshape(-1), np.repeat(rows, len(NODES))
     values = outputs_of(graph, block.polynomials_at(each, s).T, block.times_at(each, s)[None], p)
-    return np.asarray(values.reshape(-1, len(rows), len(shares)) @ matrix.T)
+    return np.asarray(values.reshape(-1, len(rows), len(NODES)) @ TO_POINTS.T)
 
 
 def _bounds(watched: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:

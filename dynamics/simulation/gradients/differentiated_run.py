@@ -206,10 +206,10 @@ class DifferentiatedRun:
             t_bar = vectors.get("t", np.zeros((1, motions.many)))
             if total is not None and rows.size:
                 places = np.arange(len(total)) if steps.rows is None else steps.rows
-                np.add.at(total, places, rows[:, rows.shape[1] - forces :])
+                np.add.at(total, places, rows[:, :forces])
             if k:
                 # cotangents of the instants and lengths of the steps, to which the event adds at the last
-                t, h = rows[:, :2, 0].T.copy()
+                t, h = rows[:, -2:, 0].T.copy()
                 t[-1] += later
                 if steps.arrival:
                     h[-1] = 0.0  # which the event determines
@@ -226,7 +226,7 @@ class DifferentiatedRun:
         """Cotangent of h of the last step of one motion, from that of x (m, 1) after it: t and h are what varies."""
         tape, derivative = segment.tape, segment.tape.of.derivative
         memory, (_, _, rows) = tape.derivative_memory({"x": seed}, 1), next(tape.records(backwards=True))
-        return float(run_passes(derivative, memory, 1, 1, rows[-1:, : derivative.program.feed_width])[0, 1, 0])
+        return float(run_passes(derivative, memory, 1, 1, rows[-1:, : derivative.program.feed_width])[0, -1, 0])
 
     def tangents(self, dots: Array) -> tuple[Array, Array, Array, Array]:
         """Rows of one motion, t (T,) and q with qd (T, m), and the tangents of both, (T, k) and (T, m, k).

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Graph
 from dynamics.equations.equations_of_motion import forward_dynamics, mass_matrix
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.mass_matrix.accelerations import accelerations
+from dynamics.experiments.stability.single_evaluations import by_centers
 from dynamics.experiments.timing import exponent
 from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.bodies.body import WORLD, Body, Joint
@@ -57,19 +57,9 @@ def from_lagrangian(model: Mechanism) -> Graph:
 
 def of_centers(model: Mechanism) -> Graph:
     """A planar arm with the velocities of the centers of mass: K = m v.v / 2 + I w^2 / 2, and its bias from L."""
-    gravity, system = -float(np.asarray(model.gravity)[2]), model.system
-
-    def partials(q: Sequence[Node], qd: Sequence[Node], t: Node) -> Iterator[Node]:
-        angle, omega, x, y, height = [cg.constant(0.0)] * 5  # the last three of the joint: velocity, and height
-        for link, turn, rate in zip(planar_links(model), q, qd, strict=True):
-            angle, omega = angle + turn, omega + rate
-            s, c = cg.sin(angle), cg.cos(angle)
-            (u, v, h), (x, y, height) = (
-                (x + r * omega * c, y + r * omega * s, height - r * c) for r in (link.center, link.length)
-            )
-            yield 0.5 * link.mass * (u * u + v * v) + 0.5 * link.inertia * (omega * omega) - link.mass * gravity * h
-
-    return accelerations(System(partials, system.coordinates, damping=system.damping), "recursive")
+    links, gravity, system = planar_links(model), -float(np.asarray(model.gravity)[2]), model.system
+    other = System(lambda q, qd, t: by_centers(q, qd, links, gravity), system.coordinates, damping=system.damping)
+    return accelerations(other, "recursive")
 
 
 VARIANTS = {
