@@ -23,6 +23,7 @@ from .run_options import Span, Steps
 from .stepper import EqualStepper, Stepper
 from .steps.dense_output import StepBlock
 from .steps.equal_steps import (
+    ALIKE,
     SAME_INSTANT,
     EqualSteps,
     Numbers,
@@ -168,7 +169,8 @@ class _Rows:
     def __init__(self, t: Array, x: Array) -> None:
         self.x, self._forth = np.full((len(t), len(x)), math.nan), np.sign(t[-1] - t[0])
         self.x[0], self.count = x, 1  # of the instants that it has come to
-        self._times = self._forth * t - SAME_INSTANT * np.spacing(np.abs(t).max())  # for those at which steps end
+        near = SAME_INSTANT * np.spacing(np.abs(t).max()) + ALIKE * np.abs(np.diff(t)).min()
+        self._times = self._forth * t - near  # for those at which steps end
 
     def keep(self, block: StepBlock) -> None:
         """The next steps."""

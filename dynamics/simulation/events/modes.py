@@ -390,7 +390,7 @@ def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Grap
     result = list[Graph]()
     for k, number in others:
         margin, own = modes.margin(before, number), modes.margin(before, first[1])
-        if _is_same(margin, own, point) or not _is_zero(margin, point, modes.sizes):
+        if _is_same(margin, own, point) or not is_zero(margin, point, modes.sizes):
             between[k] = after.modes[k]
             continue
         following = [*between]
@@ -424,7 +424,7 @@ def _slopes(margin: Graph, point: Array, m: int) -> Array:
     return values_of(slopes, point, 1)[:, 0]
 
 
-def _is_zero(margin: Graph, point: Array, sizes: Array) -> bool:
+def is_zero(margin: Graph, point: Array, sizes: Array) -> bool:
     """Whether a margin is zero there, and not turned by the mode of an earlier one on which it depends."""
     m, value = len(sizes), values_of(margin, point, 1)[0, 0]
     return bool(abs(value) <= ALIKE * (np.abs(_slopes(margin, point, m)) @ np.append(sizes, abs(point[m]))))

@@ -25,7 +25,7 @@ from ...systems.ode_system import OdeSystem
 from ...systems.system import System
 from ..applied_force import Hold, SampledController
 from ..events.event import Event, EventProgram, as_events, event_program
-from ..events.modes import Modes, Turn, entries
+from ..events.modes import Modes, Turn, entries, is_zero
 from ..outcome import MotionError, Recorder
 from ..run import Run
 from ..run_options import METHOD, Options, Span, Steps, known_options, time_span
@@ -252,10 +252,11 @@ class Motions:
             if modes is not None and last < len(t) - 1:
                 after = _turn_at(turns, t[last])
                 (k, number), *_ = modes.crossed(turn, after)
-                arrival = Arrival(f"surface {modes.words[k]!r}", modes.margin(turn, number))
-                result[-1] = result[-1]._replace(arrival=arrival)
-                of_turn = self.inputs[: len(self.inputs) - len(turn.modes), 0], turn.modes
-                entry = entries(modes, turn, after, np.concatenate([x[last], t[last : last + 1], *of_turn]))
+                inputs, margin = self.in_stretch(result[-1]).inputs[:, 0], modes.margin(turn, number)
+                point, entry = np.concatenate([x[last], t[last : last + 1], inputs]), ()
+                if not self.each_step or is_zero(margin, point, modes.sizes):  # else the next row of forces turns it
+                    result[-1] = result[-1]._replace(arrival=Arrival(f"surface {modes.words[k]!r}", margin))
+                    entry = entries(modes, turn, after, point)
         return result
 
 
