@@ -168,9 +168,3 @@ def test_a_png_shows_its_text_at_the_size_of_its_scale() -> None:
     assert np.allclose(np.divide(large, small), 2.0, atol=0.02)  # whole pixels
     inches = '<svg xmlns="http://www.w3.org/2000/svg" width="72pt" height="1in"/>'
     assert pixels(render_png(inches, scale=1.0)).shape == (96, 96)
-
-
-def test_without_resvg_the_error_names_the_extra(without: Callable[[str], None]) -> None:
-    without("resvg_py")
-    with pytest.raises(ImportError, match=r"pip install -e '\.\[viz\]'"):
-        render_png("<svg/>")
