@@ -24,9 +24,11 @@ RK4_ERROR = 1e-8  # at dt = 10 ms: (w dt)^4 w t / 120 for w = 1.2 rad/s is 2e-10
 
 
 def runaway() -> System:
-    """v' = v^2 on the second coordinate: v = 1 / (1 - t) leaves at t = 1."""
+    """v' = v^2 on the second coordinate: v = v0 / (1 - v0 t) leaves at t = 1 / v0; a spring on the first."""
     return System(
-        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2), ["calm", "wild"], forces=lambda q, qd, t: [0.0, qd[1] ** 2]
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 0.5 * q[0] ** 2,
+        ["calm", "wild"],
+        forces=lambda q, qd, t: [0.0, qd[1] ** 2],
     )
 
 
