@@ -3,8 +3,8 @@
 import io
 import stat
 import sys
-import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -97,13 +97,8 @@ def test_bad_dot_is_an_error_and_the_next_drawing_is_good(no_binary: None) -> No
 
 
 def test_drawing_works_from_threads(no_binary: None) -> None:
-    found: list[str] = []
-    threads = [threading.Thread(target=lambda: found.append(render_svg("digraph { a -> b }"))) for _ in range(3)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(found) == 3
+    with ThreadPoolExecutor(3) as pool:
+        found = list(pool.map(render_svg, ["digraph { a -> b }"] * 3))
     assert len(set(found)) == 1
 
 
