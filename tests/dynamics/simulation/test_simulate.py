@@ -135,8 +135,7 @@ def test_ctrl_c_keeps_the_rows(
         if not watched or (run.stats.steps > 1000 and written):
             break
     assert (run.stats.success, run.stats.message) == (False, f"interrupted after t = {run.t[-1]:.6g} s")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
         whole = dyn.simulate(oscillator(), [1.0], [0.0], 1e3, **given, max_steps=run.stats.steps + 100)
     assert len(run.t) == len(run.q) == len(run.energy)
     if "t_eval" not in options:

@@ -74,8 +74,7 @@ def test_many_steps_come_in_many_blocks() -> None:
     """Also of a force with a kink, across which all steps are looked at."""
     bent = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - abs(q[0]) - 0.1 * q[0], ["x"])
     runs = [(*arms(9), times) for times in (None, [0.05, 0.2], [0.15, 0.2])] + [(bent, np.ones((9, 1)), [-9.0], [0.2])]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
         whole = [simulate_many(*run, 0.2, "rk4", t_eval=times) for *run, times in runs]
         with patch.multiple(task, PASSES=3, ROWS=200):
             blocks = [simulate_many(*run, 0.2, "rk4", t_eval=times) for *run, times in runs]
@@ -199,8 +198,7 @@ def test_grids_meet_every_instant_in_steps_of_at_most_dt(gaps: list[float], dt: 
 @mark.parametrize("method", ["midpoint", "gauss6", "verlet"])
 def test_the_errors_of_an_ensemble_are_those_of_its_runs_when_the_first_of_them_fails(method: str) -> None:
     arm, starts = dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), [[2.0, 0.5], *[[0.01 * k, 0.0] for k in range(1, 9)]]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
         fan = simulate_many(arm, starts, [0.0, 0.2], 2.0, method, dt=0.2)
         alone = [dyn.simulate(arm, start, [0.0, 0.2], 2.0, method, dt=0.2) for start in starts]
     assert fan.stats.status.tolist() == [-1, *[0] * 8]
