@@ -36,8 +36,11 @@ def odd_graphs() -> dict[str, cg.Graph]:
     return {"several": cg.Graph([z, y, x], outputs), "unused": cg.Graph([x, y], {"c": 3.0}), "none": none}
 
 
-ODD_POINTS = {"several": ((3.0, 0.5, 7.0), (1.0, 3.0, 0.0), (-2.0, 3.0, -0.0), (9.0, math.nan, 2.5)),
-              "unused": ((math.nan, 10.0),), "none": ((),)}  # fmt: skip
+ODD_POINTS = {
+    "several": ((3.0, 0.5, 7.0), (1.0, 3.0, 0.0), (-2.0, 3.0, -0.0), (9.0, math.nan, 2.5)),
+    "unused": ((math.nan, 10.0),),
+    "none": ((),),
+}
 
 
 def points_of(op: Op, count: int) -> list[tuple[float, ...]]:
