@@ -621,7 +621,6 @@ CASES = {
     ),
     "info of no coordinate": (lambda: dyn.raise_if_singular(ARM, 7.0), "from 1 to 1 for a coordinate, got 7"),
     "rows without room": (lambda: RUNNER.run(np.ones((1, 1)), 10**12), "Unable to allocate"),
-    "half a link": (lambda: dyn.scenes.load("chain", n=2.5), "at least one link, got 2.5"),
     "kind of a joint": (lambda: dyn.Joint("cogwheel"), "must be one of ball, fixed, free, free (body axes), "),
     "start too long": (lambda: dyn.scenes.Scene("s", "", ARM, (0.0, 0.0), (0.0,), 1.0), "q needs 1 finite numbers"),
     "start of text": (lambda: dyn.scenes.Scene("s", "", ARM, ("a",), (0.0,), 1.0), "q"),

@@ -25,6 +25,24 @@ def graph_of(op: Op) -> cg.Graph:
     return cg.Graph(inputs, {"y": apply(op, *inputs)})
 
 
+def odd_graphs() -> dict[str, cg.Graph]:
+    """Inputs that nothing uses, outputs that are one node, constants of every kind; nothing but an input; no inputs."""
+    x, y, z = cg.variables("x y z")
+    u, nan = x * y, cg.constant(math.inf) - cg.constant(math.inf)
+    outputs = {"u": u, "again": u, "x": x, "twice": x, "inf": -math.inf, "zero": -0.0, "nan": nan, "sum": x - nan}
+    outputs |= {"large": x * 1e308, "signed": x * -0.0, "small": x + 5e-324, "cube": (-x) ** 3.0, "part": -0.1 * x}
+    outputs |= {f"n{k}": each for k, each in enumerate((0.0, 1.0, 0.1, 5e-324, 1e300, -2.5, 1e16, 2.0**127))}
+    none = cg.Graph([], {"c": 1.5, "sine": cg.sin(cg.constant(0.3)), "nan": cg.log(cg.constant(-1.0))})
+    return {"several": cg.Graph([z, y, x], outputs), "unused": cg.Graph([x, y], {"c": 3.0}), "none": none}
+
+
+ODD_POINTS = {
+    "several": ((3.0, 0.5, 7.0), (1.0, 3.0, 0.0), (-2.0, 3.0, -0.0), (9.0, math.nan, 2.5)),
+    "unused": ((math.nan, 10.0),),
+    "none": ((),),
+}
+
+
 def points_of(op: Op, count: int) -> list[tuple[float, ...]]:
     """Samples, so many points of the domain, and every combination of IEEE specials."""
     source = random.Random(op.name)

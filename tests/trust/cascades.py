@@ -166,8 +166,7 @@ def judge_balls(number: int, method: str | None = None, *, many: bool = False) -
         arguments["method"] = method
         if method in METHODS and not METHODS[method].adaptive:
             arguments |= {"dt": balls.t_end / STEPS, "estimate_error": False}
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         if many:
             runs = simulate_many(balls.system, [balls.x], [balls.v], balls.t_end, t_eval=[balls.t_end], **arguments)
             q, qd, success, message = runs.q[0, -1], runs.qd[0, -1], runs.stats.success[0], runs.stats.message[0]

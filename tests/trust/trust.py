@@ -124,8 +124,7 @@ class Verdict:
 def judge(number: int, method: str | None = None) -> Verdict:
     """The verdict on one random motion by a method with default arguments."""
     task, truth = random_motion(number), answer(number)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         start = task.q, task.qd or None
         try:
             run = simulate(task.model, *start, task.t_end, method or METHOD, progress=False)

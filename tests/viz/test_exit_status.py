@@ -98,8 +98,7 @@ def test_a_command_that_fails_ends_with_a_status_and_a_line(
     command, status, line = ENDS[what]
     monkeypatch.setattr("viz.commands.scenes.run", command)
     monkeypatch.setattr(sys, "argv", ["cgraph", "scenes"])
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(action="always"):
         assert (cli.main() if status == cli.INTERRUPTED else cli.start()) == status
     lines = capfd.readouterr().err.splitlines()
     assert lines[-1] == line

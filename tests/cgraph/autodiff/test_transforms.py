@@ -29,6 +29,8 @@ def test_names_of_inputs_and_outputs():
     assert found == NAMES
     values = {"x": 0.3, "y": 2.0}
     assert cg.jacobian(ONE, ["y", x]).evaluate(values) == cg.jacobian(ONE).evaluate(values)
+    hessian = NAMES["hessian"][0]
+    assert hessian.outputs["d2f/dxdy"] is hessian.outputs["d2f/dydx"]
 
 
 def test_a_transform_of_a_transform_has_distinct_names():
@@ -117,11 +119,6 @@ def test_a_wide_jacobian_goes_in_reverse_and_a_tall_one_forward():
     assert tall.counts().by_role.keys() & {"adjoint", "tangent"} == {"tangent"}
 
 
-def test_the_hessian_is_one_node_for_both_entries():
-    hessian = cg.hessian(ONE)
-    assert hessian.outputs["d2f/dxdy"] is hessian.outputs["d2f/dydx"]
-
-
 def test_a_transform_leaves_its_graph_alone():
     before = GRAPH.listing()
     for transform in (cg.jvp, cg.vjp, cg.jacobian, cg.simplify):
@@ -150,6 +147,8 @@ def test_a_graph_is_a_function_of_nodes():
     expected = {"f": math.sin(0.3) * 2.0, "g": 4.0}
     for graph in (by_position, by_name, mixed):
         assert graph.evaluate({"z": 0.3}) == expected
+    swapped = cg.Graph([x, y], GRAPH(y, x))
+    assert swapped.evaluate({"x": 2.0, "y": 0.3}) == expected
 
 
 def test_a_graph_used_inside_another_is_inlined_as_written():
@@ -157,12 +156,6 @@ def test_a_graph_used_inside_another_is_inlined_as_written():
     outer = cg.Graph([x], {"h": inner(inner(x)["f"])["f"]})
     assert outer.counts().by_operation == {"add": 2, "mul": 2, "constant": 1, "variable": 1}
     assert outer.evaluate({"x": 3.0}) == {"h": 81.0}
-
-
-def test_inputs_may_be_swapped():
-    graph = cg.Graph([x, y], {"f": x - 2 * y})
-    swapped = cg.Graph([x, y], graph(y, x))
-    assert swapped.evaluate({"x": 10.0, "y": 1.0}) == {"f": -19.0}
 
 
 @each_row(

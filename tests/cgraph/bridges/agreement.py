@@ -18,6 +18,9 @@ ROUNDINGS = 4e-15  # relative: of one operation, by two libraries that promise a
 SLOPES = 1e-13  # relative: of formulas of the slope that differ
 ARM = dyn.forward_dynamics(dyn.planar_arm([1.0] * 7, [1.0] * 7))  # the state and torques of seven joints
 POINT = np.random.default_rng(0).normal(size=21)
+x, y, z = cg.variables("x y z")
+SMALL = cg.Graph([x, y, z], {"f": cg.sin(x * y) + z**2, "g": cg.exp(x) * z, "h": cg.hypot(x, y)})
+SAMPLES = np.random.default_rng(0).normal(size=(4, 5, 3))
 
 
 class Bridge(NamedTuple):
@@ -65,7 +68,6 @@ def own_row(**columns: Any):
     """A row of a program's own, in the table for as long as the block takes; gives a graph that has it."""
     register(Op("own", 1, lambda x: x * x + 1.0, columns.pop("array", lambda x: x * x + 1.0), lambda y, x: (2.0 * x,),
                 samples=((0.3,),), **columns))  # fmt: skip
-    x = cg.variable("x")
     try:
         yield cg.Graph([x], {"y": apply(OPS["own"], x)})
     finally:
@@ -74,7 +76,6 @@ def own_row(**columns: Any):
 
 def lets_zero_win(bridge: Bridge) -> None:
     """Assert that an exact zero wins over infinity and NaN, and that the product then has the slopes of a product."""
-    x, y = cg.variables("x y")
     graph = cg.Graph([x, y], {"f": apply(OPS["zero_safe_mul"], x, y)})
     value, slopes = bridge.function(graph), bridge.jacobian(graph)
     for point, wanted in (((0.0, np.inf), 0.0), ((np.nan, 0.0), 0.0), ((2.0, np.inf), np.inf), ((2.0, 3.0), 6.0)):

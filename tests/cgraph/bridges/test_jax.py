@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from tests.cgraph.bridges.agreement import ARM, POINT, Bridge, agrees, disagreements, lets_zero_win, refuses
+from tests.cgraph.bridges import agreement
+from tests.cgraph.bridges.agreement import ARM, POINT, SAMPLES, SMALL
 from tests.strategies import cases, examples
 from tests.tolerances import EQUATIONS
 
@@ -14,10 +15,7 @@ jax.config.update("jax_platforms", "cpu")
 check_grads = pytest.importorskip("jax.test_util").check_grads
 jnp = jax.numpy
 
-BRIDGE = Bridge(cg.to_jax, lambda graph: jax.jit(jax.jacobian(cg.to_jax(graph))))
-x, y, z = cg.variables("x y z")
-SMALL = cg.Graph([x, y, z], {"f": cg.sin(x * y) + z**2, "g": cg.exp(x) * z, "h": cg.hypot(x, y)})
-SAMPLES = np.random.default_rng(0).normal(size=(4, 5, 3))
+BRIDGE = agreement.Bridge(cg.to_jax, lambda graph: jax.jit(jax.jacobian(cg.to_jax(graph))))
 
 
 @pytest.fixture(autouse=True)
@@ -29,17 +27,17 @@ def in_float64():
 
 
 def test_every_operation_has_its_value_and_its_slopes():
-    assert disagreements(BRIDGE) == {}
+    assert agreement.disagreements(BRIDGE) == {}
 
 
 @settings(max_examples=examples(100))
 @given(cases())
 def test_a_random_graph_has_its_values(case):
-    agrees(BRIDGE, case)
+    agreement.agrees(BRIDGE, case)
 
 
 def test_an_exact_zero_wins_and_has_the_slopes_of_a_product():
-    lets_zero_win(BRIDGE)
+    agreement.lets_zero_win(BRIDGE)
 
 
 def test_an_arm_and_its_jacobian():
@@ -57,6 +55,7 @@ def test_it_goes_through_jit_vmap_and_grad_in_any_precision():
     check_grads(jax.jit(function), (SAMPLES[0, 0],), order=2, rtol=1e-5)
     assert function(jnp.array(SAMPLES, jnp.float32)).dtype == jnp.float32
     assert function([1, 2, 3]).dtype == jnp.float64
+    x = cg.variable("x")
     constant = cg.to_jax(cg.Graph([x], {"one": cg.constant(1.0), "x": x}))
     assert constant(jnp.array([[2.0], [3.0]])).tolist() == [[1.0, 2.0], [1.0, 3.0]]
 
@@ -87,7 +86,7 @@ def test_compiled_its_derivatives_of_three_orders_are_those_of_the_graph():
 
 
 def test_what_jax_cannot_take_is_told():
-    refuses(cg.to_jax, "JAX")
+    agreement.refuses(cg.to_jax, "JAX")
     fn = cg.compile(SMALL, "python")
     for function in (cg.to_jax(SMALL), cg.as_jax(fn)):
         with pytest.raises(cg.GraphError, match=r"x must have shape \(\.\.\., 3\)"):

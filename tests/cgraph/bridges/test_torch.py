@@ -4,15 +4,11 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from tests.cgraph.bridges.agreement import ARM, POINT
+from tests.cgraph.bridges.agreement import ARM, POINT, SAMPLES, SMALL
 from tests.tolerances import EQUATIONS
 
 torch = pytest.importorskip("torch")
 pytestmark = pytest.mark.filterwarnings("ignore:.torch.jit.script. is deprecated")  # torch itself calls it
-
-x, y, z = cg.variables("x y z")
-SMALL = cg.Graph([x, y, z], {"f": cg.sin(x * y) + z**2, "g": cg.exp(x) * z, "h": cg.hypot(x, y)})
-SAMPLES = np.random.default_rng(0).normal(size=(4, 5, 3))
 
 
 def tensor(values, grad: bool = False):

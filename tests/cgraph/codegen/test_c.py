@@ -19,7 +19,7 @@ from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
 from cgraph.util.atomic_write import atomic_write
 from tests.cgraph.core.test_names import ALIKE, WORDS
-from tests.cgraph.engines import SPECIAL, evaluated, points_of
+from tests.cgraph.engines import ODD_POINTS, SPECIAL, evaluated, odd_graphs, points_of
 from tests.slow import slow
 from tests.strategies import cases
 from tests.tolerances import EQUATIONS
@@ -168,11 +168,7 @@ def test_fused_multiply_add_only_when_asked(tmp_path):
 
 @needs_cc
 def test_inputs_unused_passed_on_and_shared_by_outputs(tmp_path):
-    x, y, z = cg.variables("x y z")
-    u = x * y
-    several = cg.Graph([z, y, x], {"a": u, "b": u, "x": x, "x again": x, "c": -math.inf, "d": -0.0, "nan": x / x})
-    fixed = cg.Graph([], {"c": cg.sin(cg.constant(0.3)), "nan": cg.log(cg.constant(-1.0))})
-    agrees(tmp_path, {"several": several, "fixed": fixed}, {"several": [[3, 0, 0]], "fixed": [[]]})
+    agrees(tmp_path, odd_graphs(), ODD_POINTS)
 
 
 AWKWARD = r"a_b a/b a+b a_b_ double exp y0 θ theta Ω N_IN x */evil/* ??/ λ₁ \ ".split()

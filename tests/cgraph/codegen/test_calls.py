@@ -15,7 +15,7 @@ import pytest
 
 import cgraph as cg
 from cgraph.codegen import bound_call
-from tests.cgraph.engines import LLVM
+from tests.cgraph.engines import LLVM, ODD_POINTS, evaluated, odd_graphs
 from tests.ulps import same
 
 x, y, z = cg.variables("x y z")
@@ -160,23 +160,16 @@ def test_results_go_where_they_are_to_go(function):
 
 
 def test_odd_graphs_have_the_same_values_in_every_engine(backend):
-    """Inputs that nothing uses, outputs that are one node, constants of every kind, and no inputs at all."""
-    nan = cg.constant(math.inf) - cg.constant(math.inf)
-    outputs = {"x": x, "twice": x, "large": x * 1e308, "zero": cg.constant(-0.0), "inf": -math.inf, "nan": nan}
-    graph = cg.Graph([z, x, y], outputs | {"s": x - nan, "signed": x * -0.0, "small": x + 5e-324})
-    function = cg.compile(graph, backend)
-    for point in ([1.0, 0.0, 3.0], [-2.0, -0.0, 3.0], [9.0, 2.5, math.nan]):
-        expected = list(graph.evaluate(dict(zip("zxy", point, strict=True))).values())
-        assert same(function(point), expected)
-        assert same(function.batch(np.array(point)[:, None])[:, 0], expected)
-    unused = cg.compile(cg.Graph([x, y], {"c": 3.0}), backend)
-    assert unused([math.nan, 10.0]).tolist() == [3.0]
-    assert unused.batch(np.ones((2, 0))).shape == (1, 0)
-    alone = cg.compile(cg.Graph([], {"c": cg.constant(1.5), "s": cg.sin(cg.constant(1.0))}), backend)
-    bound = np.zeros(2)
-    alone.bind(np.empty(0), bound)()
-    for found in (bound, alone([]), alone(np.empty(0)), alone.values([]), alone.batch(np.empty((0, 60)))[:, 59]):
-        assert same(found, [1.5, math.sin(1.0)])
+    for name, graph in odd_graphs().items():
+        function = cg.compile(graph, backend)
+        for point, expected in zip(ODD_POINTS[name], evaluated(graph, ODD_POINTS[name]), strict=True):
+            x, bound = np.array(point), np.zeros(len(expected))
+            function.bind(x, bound)()
+            for found in (bound, function(point), function(x), function.values(point)):
+                assert same(found, expected)
+            assert same(function.batch(np.repeat(x[:, None], 60, axis=1))[:, 59], expected)
+            assert same(function.batch(x[:, None])[:, 0], expected)
+    assert function.batch(np.ones((0, 0))).shape == (3, 0)
 
 
 def test_a_cache_in_the_home_is_not_a_folder_called_tilde(backend, monkeypatch, tmp_path):

@@ -4,6 +4,7 @@ import itertools
 import math
 import pickle
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -299,24 +300,18 @@ def test_threads_make_one_derivative_and_run_it_at_once():
     points = np.random.default_rng(0).uniform(0.1, 1.0, (40, 4))
     alone = compiled(example())
     expected = [alone.jacobian(point) for point in points]
-    start, found = threading.Barrier(4), {}
+    start = threading.Barrier(4)
 
-    def work(thread):
+    def work(_):
         start.wait()
-        found[thread] = [
-            (function.jacobian(p), function.jvp(p, np.eye(4)).T, function.hessian(p, np.ones(8))) for p in points
-        ]
+        return [(function.jacobian(p), function.jvp(p, np.eye(4)).T, function.hessian(p, np.ones(8))) for p in points]
 
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
-    for each in threads:
-        each.start()
-    for each in threads:
-        each.join()
-    for rows in found.values():
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(work, range(4)))
+    for rows in found:
         for (jacobian, products, _), right in zip(rows, expected, strict=True):
             assert np.array_equal(jacobian, right)
             assert np.allclose(products, right, rtol=LAST_BITS)
-    assert len(found) == 4
 
 
 def test_machine_code_of_derivatives_is_kept_on_disk(tmp_path):

@@ -347,8 +347,7 @@ def test_clearing_removes_the_entries_and_nothing_else(tmp_path, monkeypatch):
 
 def test_the_choice_is_no_matter_without_machine_code(folder, without):
     without("llvmlite")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         function = cg.compile(graph(), cache=folder)
     assert function(POINT).shape == (2,)
     assert not folder.exists()

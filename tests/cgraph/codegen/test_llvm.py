@@ -157,21 +157,16 @@ def test_values_wait_in_memory_where_there_are_more_than_registers():
 
 
 def test_a_product_goes_into_its_sum_in_every_lane_and_at_a_point():
-    """Which one is said in the text: of two products, of a product that others need, too."""
+    """Of two products, of one that others need too, and where rows of a batch lie apart by a power of two."""
     a, b = cg.variables("a b")
     product = a * b
-    graph = cg.Graph([a, b], {"two": a * a - b * b, "sum": b + 3.0 * a, "kept": product - 1.0, "product": product})
-    function = cg.compile(graph, "llvm")
-    points = np.random.default_rng(1).normal(size=(2, 43))
-    assert same(function.batch(points), np.array([function(point) for point in points.T]).T)
-
-
-def test_a_batch_in_which_rows_lie_apart_by_a_power_of_two():
+    few = cg.Graph([a, b], {"two": a * a - b * b, "sum": b + 3.0 * a, "kept": product - 1.0, "product": product})
     x = cg.variables([f"x{k}" for k in range(70)])
-    graph = cg.Graph(x, {f"y{k}": x[k] * x[k - 1] + 1.0 for k in range(70)})
-    function = cg.compile(graph, "llvm")
-    points = np.random.default_rng(2).normal(size=(70, 512))
-    assert same(function.batch(points), np.array([function(point) for point in points.T]).T)
+    many = cg.Graph(x, {f"y{k}": x[k] * x[k - 1] + 1.0 for k in range(70)})
+    for graph, count in ((few, 43), (many, 512)):
+        function = cg.compile(graph, "llvm")
+        points = np.random.default_rng(count).normal(size=(len(graph.inputs), count))
+        assert same(function.batch(points), np.array([function(point) for point in points.T]).T)
 
 
 def test_auto_says_when_a_graph_is_too_large_for_machine_code(monkeypatch):

@@ -8,9 +8,9 @@ import pytest
 from mpmath import mp, mpf
 
 import cgraph as cg
-from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
 from tests import high_precision
+from tests.cgraph.engines import graph_of
 
 ULPS = 16 * 2.0**-53  # a dozen roundings
 SIZES = (5e-324, 1e-310, 1e-300, 1e-155, 1e-20, 1e-3, 0.3, 0.9, 1.0, 1 - 2.0**-53, 1.1, 20.0, 356.0, 709.0, 1e9, 1e80)
@@ -32,8 +32,7 @@ def condition(op, point):
 
 @cache
 def derived(op):
-    inputs = cg.variables(["a", "b", "c"][: op.arity])
-    graph = cg.Graph(inputs, {"y": apply(op, *inputs)})
+    graph = graph_of(op)
     return graph, (cg.gradient(graph), cg.hessian(graph))
 
 

@@ -4,6 +4,7 @@ import pickle
 import re
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -98,17 +99,14 @@ def test_threads_that_ask_for_one_name_get_one_node():
     sys.setswitchinterval(1e-6)
     try:
         for trial in range(20):
-            gate, seen = threading.Barrier(8), []
+            gate = threading.Barrier(8)
 
-            def ask(trial=trial, gate=gate, seen=seen):
+            def ask(_, trial=trial, gate=gate):
                 gate.wait()
-                seen.append([(cg.variable(f"race{trial}_{i}"), cg.constant(trial + i / 7.0)) for i in range(20)])
+                return [(cg.variable(f"race{trial}_{i}"), cg.constant(trial + i / 7.0)) for i in range(20)]
 
-            threads = [threading.Thread(target=ask) for _ in range(8)]
-            for thread in threads:
-                thread.start()
-            for thread in threads:
-                thread.join()
+            with ThreadPoolExecutor(8) as pool:
+                seen = list(pool.map(ask, range(8)))
             assert all(pair == seen[0] for pair in seen)
     finally:
         sys.setswitchinterval(before)

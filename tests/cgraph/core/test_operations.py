@@ -181,9 +181,8 @@ def specials_are_those_of_numpy(op: Op) -> None:
     assert different == []
 
 
-def specials_in_arrays_are_those_of_floats(op: Op) -> None:
-    graph = graph_of(op)
-    rows = specials(op)
+def alone_and_in_arrays(op: Op, graph: cg.Graph, rows: Sequence[Sequence[float]]) -> None:
+    """The graph of the operation has the values of arrays that it has of their numbers one by one."""
     (together,) = at(graph, *(np.array(column) for column in zip(*rows, strict=True)))
     different = [
         (point, each, alone)
@@ -194,18 +193,14 @@ def specials_in_arrays_are_those_of_floats(op: Op) -> None:
     assert different == []
 
 
+def specials_in_arrays_are_those_of_floats(op: Op) -> None:
+    alone_and_in_arrays(op, graph_of(op), specials(op))
+
+
 @pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0, 2.0, -1.0, 3.0])
 def test_a_constant_exponent_gives_arrays_the_values_of_floats(exponent):
     x = cg.variable("a")
-    graph = cg.Graph([x], {"y": x**exponent})
-    (together,) = at(graph, np.array(SPECIALS))
-    different = [
-        (value, each, alone)
-        for value, each in zip(SPECIALS, together, strict=True)
-        for alone in at(graph, value)
-        if not same_special(OPS["pow"], each, alone)
-    ]
-    assert different == []
+    alone_and_in_arrays(OPS["pow"], cg.Graph([x], {"y": x**exponent}), [(value,) for value in SPECIALS])
 
 
 PROPERTIES = (

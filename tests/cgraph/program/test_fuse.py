@@ -66,19 +66,13 @@ def test_a_fused_program_has_the_bits_of_its_statements(monkeypatch, fma, copies
         assert same(slow.run(slow.memory(START), 20).rows, fused[0])
 
 
-def test_a_graph_that_is_called_again_and_again_is_there_once(monkeypatch):
+def test_a_graph_that_is_called_again_and_again_is_there_once_and_what_is_long_stays(monkeypatch):
     body = oscillators()[0].body
     program = Program(LENGTHS, body, record=["x"])
     monkeypatch.setattr(fuse, "COPIES", 0)
     rates = [each for each in body if isinstance(each, Call) and each.graph is body[0].graph]
     assert len(rates) == 4
     assert [each for each in fuse.fused(program).body if each in rates] == rates
-
-
-def test_what_is_long_stays(monkeypatch):
-    body = oscillators()[0].body
-    program = Program(LENGTHS, body, record=["x"])
-    monkeypatch.setattr(fuse, "COPIES", 0)
     monkeypatch.setattr(fuse, "STRAIGHT", 0)
     assert [each for each in fuse.fused(program).body if isinstance(each, Map | Sum)] == [
         each for each in body if isinstance(each, Map | Sum)

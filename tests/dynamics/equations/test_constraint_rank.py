@@ -56,8 +56,7 @@ def parallelogram(
 def test_parallelograms_of_rows_in_any_units_have_one_freedom(cranks: int, units: float) -> None:
     for seed in range(3 if units == 0.0 else 30):
         system, _, _ = parallelogram(np.random.default_rng(seed), cranks, units)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as caught:
             kept = independent_rows(system.constraints)
         said = [str(each.message) for each in caught]
         assert len(kept) == cranks, (seed, said)
@@ -67,8 +66,7 @@ def test_parallelograms_of_rows_in_any_units_have_one_freedom(cranks: int, units
 @pytest.mark.parametrize("longer", [1e-13, 1e-6, *slow(1e-16, 1e-10, 1e-4, 1e-2)])
 def test_a_crank_that_is_a_little_longer_does_not_hold_a_parallelogram_in_silence(longer: float) -> None:
     system, along, _ = parallelogram(np.random.default_rng(0), 3, 0.0, longer)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         try:
             _, qd = dyn.consistent_state(system, 0.7 * along, along)
         except dyn.ConstraintError as error:
@@ -117,8 +115,7 @@ def test_rows_that_are_independent_are_kept_in_any_units(seeds: range) -> None:
     met = 0
     for seed in seeds:
         constraints = random_rows(seed).constraints
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", dyn.ConstraintWarning)
+        with warnings.catch_warnings(action="error", category=dyn.ConstraintWarning):
             try:
                 kept = independent_rows(constraints)
             except dyn.ConstraintError:  # no state was seen: rows of squares in such units

@@ -195,6 +195,12 @@ def momentum_rate(inertia: Sequence[float], state: Array, accelerations: Array) 
     return moved.real, moved.imag / 1e-30
 
 
+def upward(state: np.ndarray) -> np.ndarray:
+    """The vertical in the body's axes."""
+    _, tilt, spin = state[:3]
+    return np.array([math.sin(tilt) * math.sin(spin), math.sin(tilt) * math.cos(spin), math.cos(tilt)])
+
+
 @mark.parametrize("name", BY_TORQUE)
 def test_bodies_in_euler_angles_obey_eulers_equations(name: str) -> None:
     """d/dt L + omega x L = torque, in the body's axes; weight pulls at a point on the third axis."""
@@ -204,10 +210,7 @@ def test_bodies_in_euler_angles_obey_eulers_equations(name: str) -> None:
     for state in around(case):
         rates = np.array(list(graph.evaluate(values(case, state, 0.0)).values()))
         omega, omega_rate = momentum_rate(inertia, state, rates[3:])
-        up = np.array(
-            [math.sin(state[1]) * math.sin(state[2]), math.sin(state[1]) * math.cos(state[2]), math.cos(state[1])]
-        )
-        torque = pull * np.cross([0.0, 0.0, 1.0], -up)
+        torque = pull * np.cross([0.0, 0.0, 1.0], -upward(state))
         size = np.max(np.abs(inertia * omega)) * np.max(np.abs(omega)) + pull
         assert inertia * omega_rate + np.cross(omega, inertia * omega) == approx(torque, rel=0.0, abs=ROUNDING * size)
 
@@ -216,11 +219,8 @@ def test_the_free_body_starts_with_its_momentum_along_the_vertical() -> None:
     state = np.array(cases.load("free body about its middle axis, Euler angles").start)
     omega, _ = momentum_rate(rotation.INERTIA, state, np.zeros(3))
     assert omega == approx(np.array(rotation.OMEGA), abs=LAST_BITS)
-    up = np.array(
-        [math.sin(state[1]) * math.sin(state[2]), math.sin(state[1]) * math.cos(state[2]), math.cos(state[1])]
-    )
     momentum = np.array(rotation.INERTIA) * omega
-    assert momentum / np.linalg.norm(momentum) == approx(up, abs=LAST_BITS)
+    assert momentum / np.linalg.norm(momentum) == approx(upward(state), abs=LAST_BITS)
 
 
 WITH_INVARIANTS = [name for name, case in cases.table().items() if case.invariants and len(case.start) < LARGE]

@@ -41,8 +41,7 @@ LEFT = "contacts (the option contacts takes those of spheres and capsules)"
 
 
 def silently(read: Any, *args: Any, **options: Any) -> dyn.Mechanism:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.MechanismWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.MechanismWarning):
         return read(*args, **options)
 
 

@@ -1,7 +1,6 @@
 """Smooth forces of robot files: limits as springs, friction without its jump, actuators."""
 
 import math
-import warnings
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ import pytest
 from pytest import approx, mark, raises
 
 import dynamics as dyn
+from tests.dynamics.io.test_contacts import silently
 
 MUJOCO_ERROR = 1e-12  # relative to the largest acceleration
 RUN_ERROR = 1e-6  # of runs at rtol 1e-9 through kinks
@@ -40,12 +40,6 @@ def compiled(flags: str = "", more: str = "") -> Any:
     return mj
 
 
-def silently(mj: Any, **options: Any) -> dyn.Mechanism:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.MechanismWarning)
-        return dyn.load_mjcf(mj, **options)
-
-
 def test_actuators_are_those_of_mujoco() -> None:
     """Gear, gain and bias, all three ranges, groups that are off: accelerations of random states and inputs."""
     mj = compiled('<flag contact="disable" limit="disable" frictionloss="disable"/>')
@@ -69,7 +63,7 @@ def test_actuators_are_those_of_mujoco() -> None:
 
 def test_what_is_taken_is_not_left_out_and_the_rest_is() -> None:
     mj = compiled(more='<intvelocity name="memory" joint="jc" kp="3" actrange="-1 1"/>')
-    none = silently(mj)
+    none = silently(dyn.load_mjcf, mj)
     assert not none.forces
     assert [text.split(" (")[0] for text in none.left_out] == [
         "contacts",
@@ -86,7 +80,7 @@ def test_what_is_taken_is_not_left_out_and_the_rest_is() -> None:
     assert {kind: kinds.count(kind) for kind in kinds} == {"JointLimit": 1, "JointFriction": 2, "Actuator": 5}
     limit = next(force for force in model.forces if isinstance(force, dyn.JointLimit))
     assert (limit.body, limit.upper, limit.stiffness, limit.damping) == ("a", approx(math.pi / 3.0), 1e3, 0.1)
-    off = silently(compiled('<flag constraint="disable" actuation="disable"/>'), **SMOOTH)
+    off = silently(dyn.load_mjcf, compiled('<flag constraint="disable" actuation="disable"/>'), **SMOOTH)
     assert (off.forces, off.left_out) == ((), ())
 
 
@@ -107,7 +101,7 @@ def test_actuators_after_one_of_several_inputs_keep_their_numbers() -> None:
         none = dyn.load_mjcf(text)
     least = "least: input at least 0.5 times gear 7"
     assert none.left_out == ("actuators (1)", f"actuators that act with no input ({said}, {least})")
-    model = silently(text, actuators=True)
+    model = silently(dyn.load_mjcf, text, actuators=True)
     assert model.left_out == (f"actuators that act with no input ({said})",)
     motors = [force for force in model.forces if isinstance(force, dyn.Actuator)]
     assert [(motor.gear, motor.input_range) for motor in motors] == [(7.0, (0.5, 1.0)), (2.0, None)]

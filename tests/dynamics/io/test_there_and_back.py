@@ -144,25 +144,21 @@ def outcomes(seeds: range, *, closed: bool = False) -> dict[str, list[Any]]:
     return found
 
 
-@mark.filterwarnings("ignore:MuJoCo on the given text. Inertia matrix is too close to singular")
-@mark.parametrize("count", [30, pytest.param(300, marks=mark.slow)])
-def test_random_trees_come_back_or_are_refused(count: int, record_property: Any) -> None:
-    found = outcomes(range(count))
-    record_property("refused", len(found["refused"]))
-    assert found["altered"] == []
-    assert not any("\n" in sentence for _, sentence in found["refused"])
-    assert len(found["same"]) > count // 4
+SOFT = mark.filterwarnings("ignore:the given text. left out softness:dynamics.MechanismWarning")
+TRIED = [(False, 30, 8), pytest.param(True, 4, 1, marks=SOFT)]  # with loops, how many, and how many at least come back
+TRIED += [pytest.param(False, 300, 76, marks=mark.slow), pytest.param(True, 200, 25, marks=(mark.slow, SOFT))]
 
 
 @mark.filterwarnings("ignore:MuJoCo on the given text. Inertia matrix is too close to singular")
-@mark.filterwarnings("ignore:the given text. left out softness:dynamics.MechanismWarning")
-@mark.parametrize("count", [4, pytest.param(200, marks=mark.slow)])
-def test_random_loops_come_back_or_are_refused(count: int, record_property: Any) -> None:
-    found = outcomes(range(count), closed=True)
+@mark.parametrize(("closed", "count", "least"), TRIED)
+def test_random_trees_and_loops_come_back_or_are_refused(
+    closed: bool, count: int, least: int, record_property: Any
+) -> None:
+    found = outcomes(range(count), closed=closed)
     record_property("refused", len(found["refused"]))
     assert found["altered"] == []
     assert not any("\n" in sentence for _, sentence in found["refused"])
-    assert len(found["same"]) >= max(1, count // 8)
+    assert len(found["same"]) >= least
 
 
 @each_row(

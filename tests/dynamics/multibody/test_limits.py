@@ -88,14 +88,13 @@ def test_those_of_mjcf_are_mujocos() -> None:
     assert (efforts["e"], efforts["p"]) == ((-2.0, 10.0), (-20.0, 20.0))
     assert {arm.limits[name] for name in arm.coordinates[3:]} == {dyn.Limits()}  # a ball has none
     data = mujoco.MjData(model)
-    low, high = [], []
+    forces = []
     for ctrl in np.random.default_rng(0).uniform(-50.0, 50.0, (200, model.nu)):
         data.ctrl[:] = ctrl
         mujoco.mj_forward(model, data)
-        low.append(data.qfrc_actuator[:2].copy())
-        high.append(data.qfrc_actuator[:2].copy())
-    assert np.min(low, axis=0) == pytest.approx([-8.0, -2.0])
-    assert np.max(high, axis=0) == pytest.approx([5.0, 10.0])
+        forces.append(data.qfrc_actuator[:2].copy())
+    assert np.min(forces, axis=0) == pytest.approx([-8.0, -2.0])
+    assert np.max(forces, axis=0) == pytest.approx([5.0, 10.0])
 
 
 def test_a_joint_of_several_coordinates_has_one_for_each() -> None:

@@ -237,8 +237,7 @@ def test_a_planar_loop_in_any_plane_moves_alike(kind: str) -> None:
         else each
         for each in flat.bodies
     ]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.ConstraintWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.ConstraintWarning):
         tilted = dyn.Mechanism(bars, turn @ np.array(flat.gravity), loops=flat.loops)
         graph = dyn.forward_dynamics(tilted)
     q, qd = nearest_state(flat, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])

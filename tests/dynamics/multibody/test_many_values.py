@@ -51,6 +51,5 @@ def test_what_is_not_looked_at_is_taken(check: Callable[..., Any], shape: tuple[
         where = rng.integers(flat.shape[1])
         flat[k, where] = [np.nan, np.inf, -1.0, -flat[k, where], 1e3 * flat[k].max(), 1e308, flat[k, where]][k % 7]
     for k in set(range(COUNT)) - set(unsure(check, rows)):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error", MechanismWarning)
+        with warnings.catch_warnings(action="error", category=MechanismWarning):
             check("body 'rod': inertia", rows[k] if shape else rows[k].item())

@@ -206,7 +206,7 @@ def test_a_system_needs_a_joint_that_moves(bodies: list[Body]) -> None:
         _ = Mechanism(bodies).system
 
 
-def test_a_tree_by_its_parents_is_the_tree_spelled_out() -> None:
+def test_a_tree_by_its_parents_is_the_tree_spelled_out_and_a_chain_of_default_rods_the_planar_arm() -> None:
     parents = [-1, 0, 0, 2]
     axes = [(0, 1, 0), (1, 0, 0), (0, 0, 1), (1, 1, 0)]
     names = ["world", "link 1", "link 1", "link 3"]
@@ -222,11 +222,8 @@ def test_a_tree_by_its_parents_is_the_tree_spelled_out() -> None:
         for i in range(4)
     ]
     agree(dyn.tree(parents, axes=axes), Mechanism(spelled))
-
-
-def test_a_chain_of_default_rods_is_the_planar_arm() -> None:
-    """About -y, so that angles count alike."""
-    agree(dyn.tree(range(-1, 4), axes=(0.0, -1.0, 0.0)), dyn.planar_arm([1.0] * 5, [1.0] * 5))
+    chain = dyn.tree(range(-1, 4), axes=(0.0, -1.0, 0.0))  # about -y, so that angles count alike
+    agree(chain, dyn.planar_arm([1.0] * 5, [1.0] * 5))
 
 
 @mark.parametrize(

@@ -54,8 +54,7 @@ def one_tilted(kind: str, angle: float) -> dyn.Mechanism:
 def test_a_four_bar_with_a_tilted_axis_goes_round(kind: str, angle: float) -> None:
     q, qd = nearest_state(four_bar(kind), [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     expected = dyn.simulate(four_bar(kind), q, qd, 0.3).q[-1]
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         model = one_tilted(kind, angle)
         run = dyn.simulate(model, q, qd, 0.3)
     assert np.abs(run.q[-1] - expected).max() < 1e-7 + LOOSE * angle
@@ -143,8 +142,7 @@ def test_rows_of_which_next_to_nothing_is_new_anywhere_are_kept_and_named() -> N
 
     with pytest.warns(dyn.ConstraintWarning, match=r"new of 'other' \(.*e-08 of it is new\): kept"):
         assert "lambda1" in dyn.forward_dynamics(rows(1e-7)).outputs
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         dyn.forward_dynamics(rows(1e-3))
 
 
@@ -161,8 +159,7 @@ def test_a_flat_parallelogram_is_heard() -> None:
         dyn.arrays_at(model, dyn.forward_dynamics(model), [[0.5, -0.5, 0.5], flat])
     with pytest.raises(dyn.ConstraintError, match=said):
         dyn.consistent_state(model, flat, [1.0, 0.0, 0.0])
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         dyn.simulate(model, flat, flat, 0.1)
     assert any("the start: at this state" in str(each.message) for each in caught)
 
@@ -198,12 +195,10 @@ def motion(seed: int) -> str:
     was, and the velocities are those of the coordinates. One that is held still has lost the velocity it was given.
     """
     exact, other, angle, length = random_linkage(seed)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.ConstraintWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.ConstraintWarning):
         q, qd = moving_state(exact, length, np.random.default_rng(seed))
     size = np.array([length if body.joint.kind == "prismatic" else 1.0 for body in exact.moving])
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         try:
             run = dyn.simulate(other, q, qd, SPAN, rtol=1e-9, t_eval=np.linspace(0.0, SPAN, ROWS))
         except dyn.ConstraintError as error:

@@ -14,11 +14,12 @@ from cgraph import Graph
 from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion
 from tests.dynamics.mechanisms import FAMILIES, random_tree
-from tests.dynamics.models import Array, run as values
+from tests.dynamics.models import run as values
+from tests.dynamics.multibody import test_ball_and_free
+from tests.dynamics.multibody.test_ball_and_free import near
 from tests.dynamics.parametrized import parametrized
 from tests.each_row import each_row
 
-ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
 GRAPHS: dict[str, Callable[[Any], Graph]] = {
     "inverse dynamics": dyn.inverse_dynamics,
     "inverse dynamics, literal": lambda model: dyn.inverse_dynamics(model, "chain_rule_literal"),
@@ -45,19 +46,12 @@ def slow_cases() -> list[Any]:
 
 
 def state(mechanism: Mechanism, seed: int = 0) -> dict[str, float]:
-    system, rng = mechanism.system, np.random.default_rng(seed)
-    sizes = {"q": system.nq, "qd": system.n, "qdd": system.n, "tau": system.n}
-    drawn = {f"{name}{i}": float(x) for name, size in sizes.items() for i, x in enumerate(rng.normal(size=size))}
-    return drawn | mechanism.parameter_values
+    return test_ball_and_free.state(mechanism.system, seed, qdd=1, tau=1) | mechanism.parameter_values
 
 
 def same(a: Graph, b: Graph) -> bool:
     comparison = cg.compare(a, b)
     return not (comparison.only_left or comparison.only_right or comparison.other_outputs)
-
-
-def near(a: Array, b: Array) -> bool:
-    return bool(np.abs(a - b).max() <= ROUNDING * np.abs(b).max())
 
 
 @mark.parametrize(

@@ -9,7 +9,7 @@ from pytest import approx, mark, raises
 import dynamics as dyn
 from cgraph import structure_hash
 from dynamics.multibody.bodies.body import WORLD
-from tests.dynamics.mechanisms import random_body, random_mechanism
+from tests.dynamics.mechanisms import random_body, random_inertia, random_mechanism
 from tests.each_row import each_row
 from tests.slow import slow
 from tests.tolerances import TORQUES
@@ -22,11 +22,10 @@ def arm(n: int, seed: int = 0) -> dyn.Mechanism:
     generator = np.random.default_rng(seed)
     links = []
     for i in range(n):
-        mixed = generator.normal(size=(3, 3))
-        second = 0.05 * mixed @ mixed.T + 0.01 * np.eye(3)
+        inertia = random_inertia(generator)
         joint = dyn.Joint("revolute", generator.normal(size=3), (0.1, 0.0, 0.3) if i else (0.0, 0.0, 0.0), damping=0.1)
-        links.append({"joint": joint, "mass": 1.0 + 0.1 * i, "center": 0.1 * generator.normal(size=3),
-                      "inertia": np.trace(second) * np.eye(3) - second})  # fmt: skip
+        center = 0.1 * generator.normal(size=3)
+        links.append({"joint": joint, "mass": 1.0 + 0.1 * i, "center": center, "inertia": inertia})
     return dyn.serial_arm(links)
 
 

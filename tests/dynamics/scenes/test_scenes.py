@@ -69,19 +69,21 @@ def test_an_unknown_option_is_named_with_those_that_there_are(name: str, options
         scenes.load(name, **options)
 
 
-@each_row("n", [0, -1, 2.5, "3"])
-def test_a_chain_has_a_whole_number_of_links(n: Any) -> None:
-    with raises(ValueError, match=f"^a chain needs at least one link, got {n!r}$"):
-        scenes.load("chain", n=n)
+KNOWN = "the scenes are spring_mass, two_link, triple_pendulum, chain, any file that ends"
 
 
-@each_row("name", ["swing", "", 3, None, ["chain"]])
-def test_what_is_neither_a_name_nor_a_file_is_named_with_the_scenes(name: Any) -> None:
-    message = (
-        f"there is no scene {name!r}; the scenes are spring_mass, two_link, triple_pendulum, chain, any file that ends"
-    )
-    with raises(ValueError, match="^" + re.escape(message)):
-        scenes.load(name)
+@each_row(
+    ("name", "options", "message"),
+    [
+        *[("chain", {"n": n}, f"a chain needs at least one link, got {n!r}") for n in (0, -1, 2.5, "3")],
+        *[(name, {}, f"there is no scene {name!r}; {KNOWN}") for name in ("swing", "", 3, None, ["chain"])],
+    ],
+)
+def test_a_chain_has_a_whole_number_of_links_and_what_is_no_scene_is_named_with_those(
+    name: Any, options: Any, message: str
+) -> None:
+    with raises(ValueError, match="^" + re.escape(message) + ("$" if options else "")):
+        scenes.load(name, **options)
 
 
 @mark.parametrize("as_given", [str, Path])
@@ -142,17 +144,13 @@ def test_a_file_s_name_does_not_hide_a_scene(file: Any, monkeypatch: pytest.Monk
         ("not XML", "{path!r} is not XML, as MJCF and URDF are"),
         ("<robot><link/></robot>", "URDF, {path!r}: a link has no name"),
         ("<mujoco/>", "the mechanism has no joint that moves"),
+        (bytes(range(256)), "{path!r} is not XML, as MJCF and URDF are"),
     ],
 )
-def test_a_file_that_is_no_model_is_one_sentence(file: Any, tmp_path: Path, text: str | None, message: str) -> None:
-    path = tmp_path / "nowhere.xml" if text is None else file(text)
+def test_a_file_that_is_no_model_is_one_sentence(tmp_path: Path, text: str | bytes | None, message: str) -> None:
+    path = tmp_path / ("nowhere.xml" if text is None else "model.xml")
+    if text is not None:
+        path.write_bytes(text.encode() if isinstance(text, str) else text)
     with raises(MechanismError, match="^" + re.escape(message.format(path=str(path)))) as caught:
         loaded(path)
     assert "\n" not in str(caught.value)
-
-
-def test_bytes_that_are_no_text_are_one_sentence(tmp_path: Path) -> None:
-    path = tmp_path / "model.xml"
-    path.write_bytes(bytes(range(256)))
-    with raises(MechanismError, match=r"^'.*model\.xml' is not XML, as MJCF and URDF are$"):
-        loaded(path)

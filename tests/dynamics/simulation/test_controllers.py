@@ -230,29 +230,22 @@ def test_ctrl_c_in_a_prepared_motion_is_raised_with_what_was_run() -> None:
         motion.end(**START, t_end=1.0)
 
 
+FIRST_ORDER = dyn.OdeSystem(lambda x, t: [x[0]], ["x"])
+
+
 @mark.parametrize(
-    ("options", "error", "message"),
+    ("run", "options", "error", "message"),
     [
-        ({"t0": 2.0}, ValueError, "later than t0"),
-        ({"model": dyn.OdeSystem(lambda x, t: [x[0]], ["x"]), "q": [1.0], "qd": None}, TypeError, "first order"),
+        (dyn.simulate, {"t0": 2.0}, ValueError, "later than t0"),
+        (dyn.simulate, {"model": FIRST_ORDER, "q": [1.0], "qd": None}, TypeError, "first order"),
+        (dyn.simulate_many, {"q": [[0.1, 0.2]], "method": "rk4"}, TypeError, "controls one run"),
+        *[(dyn.simulate, {"period": p}, ValueError, "period of a controller") for p in (0.0, -1.0, math.nan, math.inf)],
     ],
 )
-def test_a_run_that_cannot_hold_forces_says_so(options: dict[str, Any], error: Any, message: str) -> None:
-    arguments = {"model": SPRINGS, **START, "t_end": 1.0, "tau": dyn.SampledController(Regulator(), 0.1), **options}
+def test_what_cannot_hold_forces_says_so(run: Any, options: dict[str, Any], error: Any, message: str) -> None:
+    arguments = {"model": SPRINGS, **START, "t_end": 1.0} | options
     with raises(error, match=message):
-        dyn.simulate(**arguments)
-
-
-def test_an_ensemble_refuses_a_controller_with_a_memory() -> None:
-    tau: Any = dyn.SampledController(Regulator(), 0.1)
-    with raises(TypeError, match="controls one run"):
-        dyn.simulate_many(SPRINGS, [[0.1, 0.2]], [0.0, 0.0], 1.0, "rk4", tau=tau)
-
-
-@mark.parametrize("period", [0.0, -1.0, math.nan, math.inf])
-def test_a_period_is_positive_and_finite(period: float) -> None:
-    with raises(ValueError, match="period of a controller"):
-        dyn.SampledController(Regulator(), period)
+        run(**arguments, tau=dyn.SampledController(Regulator(), arguments.pop("period", 0.1)))
 
 
 def test_a_table_has_the_applied_forces_where_there_are_any() -> None:

@@ -27,8 +27,7 @@ def falling(metre: float) -> dyn.System:
 
 def early(run: Callable[[], Any]) -> tuple[Any, list[str]]:
     """What a run gives, and the warnings by which it says that it stopped."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         result = run()
     assert all(each.category is dyn.SimulationWarning for each in caught)
     assert all(each.filename == __file__ for each in caught)

@@ -75,8 +75,7 @@ def test_no_equal_steps_are_wrong_in_silence(seed: int) -> None:
     model = dyn.OdeSystem(lambda x, t: [sum(a[i, j] * x[j] for j in range(3)) for i in range(3)], ["x", "y", "z"])
     values, vectors = np.linalg.eig(a)
     t_end = min(1.0, 20.0 / max(values.real.max(), 1e-3))
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         run = dyn.simulate(model, [1.0, 0.5, -0.5], None, t_end, "rk4")
     exact = (vectors * np.exp(values * t_end)) @ np.linalg.solve(vectors, [1.0, 0.5, -0.5])
     right = run.success and np.abs(run.q[-1] - exact).max() <= 1e-2 * np.abs(run.q).max()
@@ -189,8 +188,7 @@ def of(lagrangian: Any) -> dyn.System:
 
 
 def in_silence(*arguments: Any, **options: Any) -> dyn.Trajectory:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
         return dyn.simulate(*arguments, **options)
 
 

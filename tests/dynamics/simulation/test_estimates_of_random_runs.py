@@ -85,8 +85,7 @@ class RandomRun:
         options: dict[str, Any] = {"dt": self.dt * second, "t_eval": None if rows is None else rows * second}
         names = [f"x{i}" for i in indices]
         system = dyn.System(lagrangian, names, damping=(self.damping * second / one**2).tolist())
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", dyn.SimulationWarning)
+        with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
             start = self.q * one, self.qd * one / second
             return dyn.simulate(system, *start, self.t_end * second, self.method, **options)
 

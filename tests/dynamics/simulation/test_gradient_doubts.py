@@ -23,8 +23,7 @@ USUAL = "euler rk4 verlet midpoint gauss4".split()
 
 def said(run: Callable[[], Any]) -> tuple[Any, list[str]]:
     """A result, and its warnings, each of which is at the caller's line."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with warnings.catch_warnings(record=True, action="always") as caught:
         result = run()
     assert all(each.category is dyn.SimulationWarning for each in caught)
     assert all(each.filename == __file__ for each in caught)

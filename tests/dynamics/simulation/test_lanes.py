@@ -17,6 +17,7 @@ from dynamics.simulation.ensembles.task import FEW_TRAJECTORIES, VECTOR, fits_la
 from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
 from tests.dynamics.models import oscillator, random_arm
+from tests.dynamics.simulation.test_simulate import runaway
 from tests.early_end import stops
 from tests.slow import slow
 
@@ -146,11 +147,7 @@ def test_lanes_that_are_interrupted_go_on_with_the_same_bits() -> None:
 @mark.parametrize("method", LANES)
 def test_one_that_fails_is_not_felt_and_says_what_it_says_alone(method: str) -> None:
     """v' = v^2 leaves at t = 1 / v."""
-    model = dyn.System(
-        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 0.5 * q[0] ** 2,
-        ["calm", "wild"],
-        forces=lambda q, qd, t: [0.0, qd[1] ** 2],
-    )
+    model = runaway()
     q, qd = starts(model, 5)
     qd[:, 1] = -1.0
     calm = simulate_many(model, q, qd, 2.0, method, t_eval=np.linspace(0.0, 2.0, 21))
@@ -193,8 +190,7 @@ def test_as_many_steps_as_alone() -> None:
     fan = simulate_many(model, q, qd, 1.0, t_eval=[0.01, 1.0], max_steps=steps)
     assert fan.stats.success[0]
     for k in COMPARED:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", dyn.SimulationWarning)
+        with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
             one = dyn.simulate(model, q[k], qd[k], 1.0, t_eval=[0.01, 1.0], max_steps=steps)
         assert (fan.stats.message[k], fan.stats.steps[k]) == (one.stats.message, one.stats.steps)
     assert not fan.stats.success.all()

@@ -198,8 +198,7 @@ def test_quaternions_and_loops_by_displacements_and_through_projections(make: An
     assert result["q"].shape == (n,) == (shifts.shape[1],)
     ends = []
     for sign in (1.0, -1.0):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", dyn.ConstraintWarning)
+        with warnings.catch_warnings(action="ignore", category=dyn.ConstraintWarning):
             ends.append(dyn.gradient(model, final, q + sign * 1e-6 * shifts @ np.ones(n), qd, **given).value)
     assert (ends[0] - ends[1]) / 2e-6 == approx(float(result["q"].sum()), rel=1e-6)
 

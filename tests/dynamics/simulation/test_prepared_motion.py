@@ -102,8 +102,7 @@ def test_instants_cut_its_steps(method: str) -> None:
 )
 def test_whatever_is_fixed(options: dict[str, Any]) -> None:
     motion = dyn.prepare(ARM, **options)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
         run = dyn.simulate(ARM, *START, SPAN, **options)
         same(motion(*START, SPAN), run)
         assert {name: each.t.tolist() for name, each in run.events.items()} == {
@@ -132,8 +131,7 @@ def test_whatever_is_fixed(options: dict[str, Any]) -> None:
 )
 def test_ends_alone_are_those_of_all_steps(method: str, options: dict[str, Any]) -> None:
     """Such a run records no step; it is one of as many steps, and stops and warns in the same words."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
         ends = dyn.simulate(ARM, *START, SPAN, method, t_eval=[0.0, SPAN], **options)
         whole = dyn.simulate(ARM, *START, SPAN, method, **options)
     assert (ends.t.tolist(), ends.q.tolist()) == (whole.t[[0, -1]].tolist(), whole.q[[0, -1]].tolist())

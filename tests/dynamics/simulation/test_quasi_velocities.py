@@ -166,8 +166,7 @@ def test_a_failed_run_names_the_velocity() -> None:
     blowing = dyn.Mechanism(
         [dyn.Body("kite", dyn.Joint("ball", damping=0.0), mass=1.0, inertia=np.diag([1.0, 2.0, 3.0]))]
     )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         run = dyn.simulate(blowing, TURN, [1e200, 1e200, 1e200], 1.0, "rk4", dt=0.1)
     assert not run.success
     assert "kite." in run.message

@@ -24,9 +24,11 @@ RK4_ERROR = 1e-8  # at dt = 10 ms: (w dt)^4 w t / 120 for w = 1.2 rad/s is 2e-10
 
 
 def runaway() -> System:
-    """v' = v^2 on the second coordinate: v = 1 / (1 - t) leaves at t = 1."""
+    """v' = v^2 on the second coordinate: v = v0 / (1 - v0 t) leaves at t = 1 / v0; a spring on the first."""
     return System(
-        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2), ["calm", "wild"], forces=lambda q, qd, t: [0.0, qd[1] ** 2]
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 0.5 * q[0] ** 2,
+        ["calm", "wild"],
+        forces=lambda q, qd, t: [0.0, qd[1] ** 2],
     )
 
 
@@ -133,8 +135,7 @@ def test_ctrl_c_keeps_the_rows(
         if not watched or (run.stats.steps > 1000 and written):
             break
     assert (run.stats.success, run.stats.message) == (False, f"interrupted after t = {run.t[-1]:.6g} s")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
+    with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
         whole = dyn.simulate(oscillator(), [1.0], [0.0], 1e3, **given, max_steps=run.stats.steps + 100)
     assert len(run.t) == len(run.q) == len(run.energy)
     if "t_eval" not in options:

@@ -23,24 +23,28 @@ def point(graph):
     return [math.sin(1.0 + k) for k in range(len(graph.inputs))]
 
 
+def function_of(text):
+    """What a text defines, with nothing else known."""
+    names: dict = {}
+    exec(text, names)
+    return names["function"]
+
+
 @each_row("what", EQUATIONS)
 def test_python_is_the_graph(what, capsys):
     """With what it calls above it: the text alone runs."""
     assert cli.main(["code", "triple_pendulum", "--python", "--what", what]) == 0
-    names: dict = {}
-    exec(capsys.readouterr().out, names)
+    function = function_of(capsys.readouterr().out)
     graph = EQUATIONS[what](SCENE)
     expected = graph.evaluate(dict(zip(graph.input_names, point(graph), strict=True)))
-    assert names["function"](point(graph)) == tuple(expected.values())
+    assert function(point(graph)) == tuple(expected.values())
 
 
 def test_operations_that_python_lacks_are_taken_from_the_table():
     inputs = cg.variables("a b c")
     graph = cg.Graph(inputs, {name: apply(op, *inputs[: op.arity]) for name, op in OPS.items()})
-    names: dict = {}
-    exec(python_text(graph), names)
     at = [0.3, 0.6, 0.2]
-    assert names["function"](at) == tuple(graph.evaluate(dict(zip("abc", at, strict=True))).values())
+    assert function_of(python_text(graph))(at) == tuple(graph.evaluate(dict(zip("abc", at, strict=True))).values())
 
 
 def test_javascript_has_steps_with_the_state_equation(tmp_path, capsys):
@@ -60,9 +64,7 @@ def test_javascript_has_steps_with_the_state_equation(tmp_path, capsys):
 def test_of_a_first_order_system_it_is_the_state_equation(tmp_path, capsys):
     (tmp_path / "decay.py").write_text('import dynamics as dyn\nsystem = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])\n')
     assert cli.main(["code", f"{tmp_path}/decay.py:system", "--python"]) == 0
-    names: dict = {}
-    exec(capsys.readouterr().out, names)
-    assert names["function"]([3.0]) == (-3.0,)
+    assert function_of(capsys.readouterr().out)([3.0]) == (-3.0,)
 
 
 def test_c_is_one_text_or_two_files(tmp_path, capsys):

@@ -1,7 +1,7 @@
 """The drawing of a graph as DOT: what is drawn, under which ids, and with which words."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 from xml.etree import ElementTree
 
@@ -304,9 +304,3 @@ def test_the_picture_carries_the_ids() -> None:
     tree = ElementTree.fromstring(render_svg(to_dot(graph)))
     identities = {group.get("id") for group in tree.iter(f"{SVG}g")}
     assert set(boxes(graph)) | set(arrows(graph)) <= identities
-
-
-def test_without_graphviz_the_error_names_the_extra(without: Callable[[str], None]) -> None:
-    without("graphviz")
-    with pytest.raises(ImportError, match=r"pip install -e '\.\[viz\]'"):
-        to_dot(spring())

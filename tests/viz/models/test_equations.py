@@ -136,9 +136,7 @@ def python_of(element: ElementTree.Element) -> str:
         return SIGNS.get(element.text, element.text)
     if element.tag in ("mi", "mn"):
         return element.text
-    if element.tag == "mtable":
-        return f"[{', '.join(inside)}]"
-    if element.tag == "mtr":
+    if element.tag in ("mtable", "mtr"):
         return f"[{', '.join(inside)}]"
     if inside and inside[0] == inside[-1] == "|":
         return f"abs({''.join(inside[1:-1])})"
