@@ -291,7 +291,7 @@ def _root(one: Quantities, p: Array, block: StepBlock, row: int, low: float, hig
     if not f_b < 0.0:
         return high
     c, f_c, share = a, f_a, 0.5
-    while abs(b - a) > 2.0 * UNIT * max(abs(a), abs(b)):
+    while abs(b - a) > 2.0 * UNIT * max(abs(a), abs(b), SHORTEST):
         s = a + share * (b - a)
         f = value(s)
         if (f < 0.0) == (f_a < 0.0):

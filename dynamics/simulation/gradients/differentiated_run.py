@@ -29,6 +29,7 @@ MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, chec
 PIECE = 4096  # passes between two looks at Python
 FEW_DIRECTIONS = 4  # directions: of fewer, iterations one after another are done sooner than a vector of them
 MOST_TURNS = 20  # of Newton's method for the length of a step that arrives at an event
+SHORTER = 1e-3  # of a step that ends at a surface beyond which a law has no value, at most
 
 
 @dataclass(eq=False)
@@ -140,19 +141,34 @@ class DifferentiatedRun:
         motions = segment.motions
         t, h, tape, count, last = segment.steps.t, segment.steps.h, segment.tape, len(segment.steps.h), np.inf
         before = float(t[-2])
-        for _ in range(MOST_TURNS):
+
+        def arrived(length: float) -> tuple[Array, Array, float]:
+            h[-1], t[-1] = length, before + length
             memory = tape.memory.copy()
             run_passes(tape.of.forward, memory, 1, 1, tape.feed(count - 1, count))
             x = tape.value("x", memory)
             point = motions.point(x, t[-1])
+            return x, point, float(_outputs(event.values, point)[0, 0]) + 0.0 * float(x.sum())
+
+        tried, short = float(h[-1]), np.finfo(float).eps
+        while event.beyond and math.isnan(arrived(tried)[2]) and short < SHORTER:  # by rounding beyond a surface
+            tried, short = float(h[-1]) * (1.0 - short), 4.0 * short
+        kept = tried
+        for _ in range(MOST_TURNS):
+            x, point, value = arrived(tried)
             slopes, x_dot = self._slopes(motions, event, x, t[-1]), _outputs(motions.problem.rate, point)
             # Newton's method: h -= g / (dg/dx xdot + dg/dt)
-            change = float((_outputs(event.values, point) / (slopes[: len(x)].T @ x_dot + slopes[len(x)]))[0, 0])
+            change = float((value / (slopes[: len(x)].T @ x_dot + slopes[len(x)]))[0, 0])
             if not abs(change) < last:
                 break
-            last = abs(change)
-            h[-1] -= change
-            t[-1] = before + h[-1]
+            kept, last, tried = tried, abs(change), tried - change
+        if event.beyond and math.isfinite(value):
+            kept, further = tried, math.copysign(np.spacing(abs(t[-1])), tried)
+            while value > 0.0 and abs(further) < abs(tried):
+                tried, further = tried + further, 2.0 * further
+                value = arrived(tried)[2]
+        if not math.isfinite(value):  # where a law has no value beyond its surface
+            arrived(kept)
         if not np.isfinite(h[-1]):
             raise MotionError(f"{event.name} at t = {before:.6g} s does not pass through zero with a slope")
         tape.run(count - 1, count)

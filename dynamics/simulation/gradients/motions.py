@@ -50,6 +50,7 @@ class Arrival(NamedTuple):
 
     name: str
     values: Graph
+    beyond: bool = False  # whether the motion goes on where it is negative, before which a law may have no value
 
 
 class Stretch(NamedTuple):
@@ -255,7 +256,9 @@ class Motions:
                 inputs, margin = self.in_stretch(result[-1]).inputs[:, 0], modes.margin(turn, number)
                 point, entry = np.concatenate([x[last], t[last : last + 1], inputs]), ()
                 if not self.each_step or is_zero(margin, point, modes.sizes):  # else the next row of forces turns it
-                    result[-1] = result[-1]._replace(arrival=Arrival(f"surface {modes.words[k]!r}", margin))
+                    result[-1] = result[-1]._replace(
+                        arrival=Arrival(f"surface {modes.words[k]!r}", margin, beyond=True)
+                    )
                     entry = entries(modes, turn, after, point)
         return result
 
