@@ -71,6 +71,11 @@ class Quantities:
         return Graph(self.values.inputs, dict(outputs[len(outputs) - self.resolved :]))
 
     @cached_property
+    def states(self) -> list[int]:
+        """States that they depend on."""
+        return [k for k in range(self.size) if reaches(self.values.outputs.values(), self.values.inputs[k : k + 1])]
+
+    @cached_property
     def slopes(self) -> Graph:
         """Their tangents: inputs those of `values`, then tangents of states and t."""
         return cg.simplify(cg.jvp(self.values, list(self.values.input_names[: self.size + 1])))
@@ -273,19 +278,18 @@ def _values(one: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array
 def _root(one: Quantities, p: Array, block: StepBlock, row: int, low: float, high: float) -> float:
     """The first share of a step, but for rounding, at which a quantity that falls is below zero (Chandrupatla 1997)."""
     assert block.dense is not None
-    powers, start = block.dense[row][::-1], block.x_old[row]
-    t, h, fixed, function = (
-        float(block.t_old[row]),
-        float(block.h[row]),
-        p.tolist(),
-        _operations(one.values, numbers=True),
-    )
+    t, h, m, function = float(block.t_old[row]), float(block.h[row]), one.size, _operations(one.values, numbers=True)
+    known, powers = [*block.x_old[row].tolist(), t, *p.tolist()], block.dense[row][::-1].T.tolist()
+    moving = [(k, known[k], powers[k]) for k in one.states]
 
     def value(s: float) -> float:
-        x = np.zeros_like(start)
-        for coefficients in powers:
-            x = (x + coefficients) * s
-        return float(function([*(start + x).tolist(), t + s * h, *fixed])[0])
+        for k, start, coefficients in moving:
+            x = 0.0
+            for coefficient in coefficients:
+                x = (x + coefficient) * s
+            known[k] = start + x
+        known[m] = t + s * h
+        return float(function(known)[0])
 
     a, b, f_a, f_b = low, high, value(low), value(high)
     if not f_b < 0.0:
@@ -310,21 +314,20 @@ def _root(one: Quantities, p: Array, block: StepBlock, row: int, low: float, hig
 
 
 @memo(DEGREES)
-def _binomials(degree: int) -> tuple[Array, Array]:
-    """C(k, i), and the matrix from powers to Bernstein's polynomials."""
+def _binomials(degree: int) -> tuple[Array, Array, Indices, Indices]:
+    """C(k, i), 0 for k < i; the matrix from powers to Bernstein's polynomials; k - i, and i."""
+    i, k = np.indices((degree + 1, degree + 1))
     choose = np.array([[math.comb(k, i) for k in range(degree + 1)] for i in range(degree + 1)], dtype=np.float64)
-    return choose, choose.T / choose[:, degree]
+    return choose, choose.T / choose[:, degree], np.maximum(k - i, 0), i
 
 
 def _control_points(coefficients: Array, a: Array, b: Array) -> Array:
     """Bernstein coefficients (n, degree + 1, m) of polynomials (n, degree + 1, m) on [a, b] (n,)."""
-    degree = coefficients.shape[1] - 1
-    choose, matrix = _binomials(degree)
+    choose, matrix, before, inside = _binomials(coefficients.shape[1] - 1)
     if not a.any() and (b == 1.0).all():
         return np.asarray(matrix @ coefficients)
-    i, k = np.indices(choose.shape)
-    parts = choose * a[:, None, None] ** np.maximum(k - i, 0) * (b - a)[:, None, None] ** i
-    return np.asarray(matrix @ np.where(k >= i, parts, 0.0) @ coefficients)
+    parts = choose * a[:, None, None] ** before * (b - a)[:, None, None] ** inside
+    return np.asarray(matrix @ parts @ coefficients)
 
 
 def _state_points(block: StepBlock, rows: Indices, a: Array, b: Array) -> Array:
