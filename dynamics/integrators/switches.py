@@ -41,13 +41,14 @@ class Switches:
 
     @cached_property
     def words(self) -> tuple[str, ...]:
-        """The surfaces as formulas, such as "qd.x", or "floor(t)"; dots stand for what is long."""
+        """The surfaces as formulas, such as "qd.x", or "floor(t)"; dots stand for what is long, with its tags."""
         names = Names(Graph(self.gaps.inputs, {f"{k}": side for k, side in enumerate(self.sides)}), self.called)
         texts = list[str]()
-        for side in self.sides:
+        for side, surface in zip(self.sides, self.surfaces.outputs.values(), strict=True):
             g = side if side.op.name == "floor" else side.args[0]
             first = g.args[0].value if g.op.name == "add" else None
             text = names.text(g if first is None else g.args[1], LONGEST_WORDS)
             text += "" if first is None else f" {'-' if first < 0.0 else '+'} {abs(first):.6g}"
-            texts.append(re.sub(r"%\d+", "..", text))
+            text, shortened = re.subn(r"%\d+", "..", text)
+            texts.append(f"{text} of {', '.join(sorted(surface.tags))}" if shortened and surface.tags else text)
         return tuple(texts)
