@@ -85,7 +85,7 @@ def _half_steps(run: DifferentiatedRun) -> list[list[str]]:
     if not options.estimated:
         return []
     halves = tuple([each.steps.half_steps() for each in run.segments])
-    tau = np.repeat(motions.tau, 2, axis=0) if motions.each_step else motions.tau
+    tau = np.repeat(motions.tau, 2, axis=0) if motions.each_step and halves[0].rows is None else motions.tau
     every = [each.tape.checkpoints or max(1, len(each.steps.h) // LOOKS) for each in run.segments]
     text = "its error is unknown: in steps of half the length "
     try:

@@ -164,3 +164,67 @@ def test_a_ball_in_space_slides_rolls_and_bounces() -> None:
     run = dyn.simulate(model, [0.0, 0.0, 0.3, 1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1.0)
     assert run.qd[-1, 0] == approx(5.0 / 7.0, rel=1e-9)
     assert run.qd[-1, 4] * 0.1 == approx(5.0 / 7.0, rel=1e-9)
+
+
+@mark.parametrize("method", ["dop853", "rk4", *slow("dopri5", "radau", "rodas")])
+def test_a_slide_and_a_side_may_be_short_beside_a_step(method: str) -> None:
+    """At rest from T on, and loaded by t until it breaks away at 1; above the surface for 2 v, where y grows by t."""
+    loaded = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2, ["x"], forces=lambda q, qd, t: [-t - cg.sign(qd[0])])
+    for rest in (0.9, 0.99, 0.9999):
+        start = rest - 0.5 + (rest**2 - 0.25) / 2.0
+        run = dyn.simulate(loaded, [0.0], [start], 2.0, method, t0=0.5, **options(method))
+        assert run.qd[-1, 0] == approx(-0.5, rel=1e-7)
+    hop = dyn.OdeSystem(lambda x, t: [x[1], -1.0, cg.less(0.0, x[0])], ["x", "v", "y"])
+    for v in (0.1, 1e-3, 1e-5):
+        end = dyn.simulate(hop, [-0.5 * v - 0.125, v + 0.5, 0.0], None, 1.0, method, **options(method)).q[-1]
+        assert end[2] == approx(2.0 * v, rel=1e-4)
+
+
+def test_what_is_at_rest_at_zero_stays_without_rounding() -> None:
+    """Two blocks on one another, that a load lets go later."""
+    blocks = dyn.System(
+        lambda q, qd, t: qd[0] ** 2 + 0.5 * qd[1] ** 2,
+        ["lower", "upper"],
+        forces=lambda q, qd, t: [
+            12.0 * cg.sin(t) - 3.0 * cg.sign(qd[0]) - 2.0 * cg.sign(qd[0] - qd[1]),
+            2.0 * cg.sign(qd[0] - qd[1]),
+        ],
+    )
+    runs = [dyn.simulate(blocks, [0.0, 0.0], [0.0, 0.0], 20.0, method) for method in ("dop853", "dopri5")]
+    assert runs[0].modes.t[1] == approx(math.asin(0.25), rel=1e-9)
+    assert runs[0].q[-1] == approx(runs[1].q[-1], rel=1e-7)
+    assert len(runs[0].t) < 100
+
+
+@mark.parametrize("method", ["rk4", *slow("euler", "verlet", "gauss4")])
+def test_rows_of_forces_have_slopes_across_rest_and_where_they_break_it(method: str) -> None:
+    pair = dyn.System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2 - (q[0] - q[1]) ** 2),
+        ["x", "y"],
+        {"f": 0.3},
+        forces=lambda q, qd, t, p: [-p["f"] * cg.sign(qd[0]), 0.0],
+    )
+    tau = np.array([[0.5, 0.1], [-0.2, 0.0], [-0.2, 0.3], [0.2, -0.1], [1.5, 0.0], [0.3, 0.2]])
+
+    def slopes(rows: Any) -> Any:
+        how: dict[str, Any] = {"tau": rows, "wrt": "tau", "estimate_error": False}
+        return dyn.gradient(pair, lambda q, qd, t: q[0] + q[1], [0.3, 0.0], [0.1, 0.0], 3.0, method, **how)
+
+    found, h = slopes(tau)["tau"], 1e-6
+    for k in np.ndindex(tau.shape):
+        aside = np.zeros_like(tau)
+        aside[k] = h
+        assert found[k] == approx((slopes(tau + aside).value - slopes(tau - aside).value) / (2.0 * h), abs=1e-6)
+
+
+@mark.parametrize("method", ["dop853", "rk4", *slow("dopri5", "radau", "gauss4")])
+def test_slopes_go_across_a_surface_beyond_which_a_law_has_no_value(method: str) -> None:
+    ball = dyn.System(
+        lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0],
+        ["x"],
+        forces=lambda q, qd, t: [1e4 * cg.maximum(-q[0], 0.0) ** 1.5],
+    )
+    how: dict[str, Any] = {} if METHODS[method].adaptive else {"dt": 1e-3, "estimate_error": False}
+    found = dyn.gradient(ball, lambda q, qd, t: q[0], [0.5], [0.0], 1.0, method, wrt="q", **how)
+    ends = [dyn.simulate(ball, [0.5 + h], [0.0], 1.0, rtol=1e-12).q[-1, 0] for h in (-1e-6, 1e-6)]
+    assert found["q"] == approx((ends[1] - ends[0]) / 2e-6, rel=1e-4)
