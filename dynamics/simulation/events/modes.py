@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import NamedTuple
@@ -26,7 +25,7 @@ from .event import rounding_errors
 
 AT_ONCE = 1e-11  # of the sizes of the states so far: by so much surfaces may be off that are met at one instant
 SHARE = 1e-9  # of a slide, which is rounding
-LATER, AHEAD = 3, 1e-6  # of the sizes of states, by which motions go on that are looked at later
+LATER, AHEAD = 3, 1e-6  # of the time in which states go as far as they have been, after which they are looked at later
 FEW = 5  # surfaces at an instant, of which all combinations are tried
 ROUNDS = 50  # of pivots for each of more
 STUCK = 20  # turns at one instant, besides three of each surface
@@ -296,8 +295,9 @@ class _Choice:
             if order == LATER:
                 rate = outputs_of(self._of.plain.rate, np.concatenate([x, [t], fixed])[:, None])[: len(x), 0]
                 moves = (sizes > 0.0) & (rate != 0.0)
-                after = self._of.direction * AHEAD * np.min(sizes[moves] / np.abs(rate[moves]), initial=math.inf)
-                x, t = (x + after * rate, t + after) if math.isfinite(after) else (x, t)
+                if moves.any():
+                    after = self._of.direction * AHEAD * float(np.median(sizes[moves] / np.abs(rate[moves])))
+                    x, t = x + after * rate, t + after
             ways = np.array([[0.0] * len(x), *_signs(len(x))]).T
             states = x[:, None] + AT_ONCE * sizes[:, None] * ways
             fixed = np.concatenate([[t], fixed])[:, None]
