@@ -49,9 +49,9 @@ LAZY = {
 }
 MOST_LAZY = 10
 LINES = {  # at most; whoever makes room writes the lower number, and nobody a higher one
-    "packages": 62_445,
-    "tests": 41_446,
-    "bench": 4_487,
+    "packages": 62_409,
+    "tests": 41_352,
+    "bench": 4_476,
     "pages": 5_297,
 }
 MOST_FILES = 16  # in a folder, those of its sub-folders counted
