@@ -32,7 +32,7 @@ SHORTEST, FINE = 2.0**-50, 2.0**-12  # of a step, a cell; and one of what the st
 LEFT = 1e-3  # of the largest that a quantity has been in a step, by which it has left zero
 PARTS = np.array([0.0, *2.0 ** np.arange(-20.0, -5.0), *np.linspace(0.0, 1.0, 33)[1:]])  # where one that begins at zero
 DEGREES = 8  # of dense output, whose matrices are kept
-OFTEN = 200  # calls of a graph, which take about as long as to compile it
+OFTEN = 80  # calls of a graph, which take about as long as to compile it
 ALIKE = 256  # points, that take about as long as a call
 
 NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(FITTED + 1) / FITTED)  # shares of a cell, its ends with them
