@@ -42,6 +42,7 @@ OPTIONS_KEPT = 16  # options and equal steps that stay for another run
 EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
 NOT_TAKEN = "max_steps", "dense_output", "fma", "progress"
 SAME_ROW = 1e-6  # of a step, by which it may begin before the row of its force
+CREPT = 1e-4  # of the longest step before a surface, steps so near to it
 _PLAIN = (float, int, str, bool, type(None))
 
 
@@ -235,11 +236,15 @@ class Motions:
     def _turned(self, t: Array, x: Array, modes: Modes | None, entry: tuple[Graph, ...]) -> list[Stretch]:
         """Steps that end at t (T,) and x (T, m), from an entry on, between crossings of surfaces."""
         turns = [] if modes is None else modes.turns
-        instants = {turn.t for turn in turns}
-        ends = [k for k in range(1, len(t)) if k == len(t) - 1 or t[k] in instants]
+        at = {turn.t for turn in turns}
+        ends = [k for k in range(1, len(t)) if k == len(t) - 1 or t[k] in at]
         result = list[Stretch]()
         for first, last in itertools.pairwise([0, *ends]):
-            made = _stretch(t[first : last + 1], np.diff(t[first : last + 1]))
+            instants = t[first : last + 1]
+            if last < len(t) - 1:  # steps that creep to a surface beyond which a law has no value are one
+                far = np.abs(instants[-1] - instants) > CREPT * np.abs(np.diff(instants)).max()
+                instants = instants[far | (np.arange(len(far)) % (len(far) - 1) == 0)]
+            made = _stretch(instants, np.diff(instants))
             if self.each_step:
                 place = np.abs(made.t[:-1] - self.span.t0) / self.span.length * len(self.tau)
                 made = made._replace(rows=np.minimum((place + SAME_ROW).astype(np.intp), len(self.tau) - 1))
