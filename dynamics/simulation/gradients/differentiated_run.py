@@ -221,8 +221,10 @@ class DifferentiatedRun:
                 self._require_solved(failed)
             t_bar = vectors.get("t", np.zeros((1, motions.many)))
             if total is not None and rows.size:
-                places = np.arange(len(total)) if steps.rows is None else steps.rows
-                np.add.at(total, places, rows[:, :forces])
+                if steps.rows is None:
+                    total += rows[:, :forces]
+                else:
+                    np.add.at(total, steps.rows, rows[:, :forces])
             if k:
                 # cotangents of the instants and lengths of the steps, to which the event adds at the last
                 t, h = rows[:, -2:, 0].T.copy()

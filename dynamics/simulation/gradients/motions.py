@@ -236,8 +236,8 @@ class Motions:
     def _turned(self, t: Array, x: Array, modes: Modes | None, entry: tuple[Graph, ...]) -> list[Stretch]:
         """Steps that end at t (T,) and x (T, m), from an entry on, between crossings of surfaces."""
         turns = [] if modes is None else modes.turns
-        at = {turn.t for turn in turns}
-        ends = [k for k in range(1, len(t)) if k == len(t) - 1 or t[k] in at]
+        met = np.flatnonzero(np.isin(t[1:-1], [turn.t for turn in turns])) + 1 if turns else np.zeros(0, dtype=np.intp)
+        ends = [*met.tolist(), len(t) - 1][: len(t) - 1]
         result = list[Stretch]()
         for first, last in itertools.pairwise([0, *ends]):
             instants = t[first : last + 1]
