@@ -25,7 +25,7 @@ from ...integrators.problem import reaches
 from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.state_sizes import Flags
 
-MOST_CELLS = 4096  # that wait at once
+MOST_CELLS, TOGETHER = 4096, 256  # that wait at once, and steps that are searched together
 MOST_NUMBERS = 2**19  # of operations on the cells that wait, or on points that are looked at together
 FITTED = 8  # degree of polynomials through values
 SHORTEST, FINE = 2.0**-50, 2.0**-12  # of a step, a cell; and one of what the step resolves, but for rounding
@@ -194,10 +194,15 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
     low, _ = _bounds(watched, p, block, rows, np.zeros(len(rows)), np.ones(len(rows)))
     doubtful, number = np.nonzero(~(low >= 0.0).T)
     for n in dict.fromkeys(number.tolist()):
-        where = doubtful[number == n]
-        a = np.where(where == 0, _left_at(watched.part(n), p, block, fresh[n]), 0.0)
-        found, sure = _first_zero(watched.part(n), p, block, where[a < 1.0], a[a < 1.0], best)
-        best, is_sure = best if found is None else Crossing(*found, n), is_sure and sure
+        one, where = watched.part(n), doubtful[number == n]
+        left = 0.0 if where[0] else _left_at(one, p, block, fresh[n])
+        for steps in np.split(where, range(TOGETHER, len(where), TOGETHER)):
+            a = np.where(steps == 0, left, 0.0)
+            found, sure = _first_zero(one, p, block, steps[a < 1.0], a[a < 1.0], best)
+            is_sure = is_sure and sure
+            if found is not None:
+                best = Crossing(*found, n)
+                break
     return best, is_sure
 
 
