@@ -407,7 +407,10 @@ class EqualStepper(Stepper):
 
     def beside(self, stretches: Sequence[EqualSteps]) -> EqualStepper:
         """The stepper of other stretches, without events."""
-        options, modes = replace(self.options, max_steps=math.inf), self.modes and Modes(self.modes.plain)
+        modes, most = None, math.inf
+        if self.modes is not None:  # which it meets about as often
+            modes, most = Modes(self.modes.plain), sum([each.steps for each in stretches]) + 2.0 * self.steps + 1000.0
+        options = replace(self.options, max_steps=most)
         other = EqualStepper(self._plain, options, self._given, stopped=self.stopped, modes=modes)
         other.stretches = stretches
         return other
