@@ -228,3 +228,13 @@ def test_slopes_go_across_a_surface_beyond_which_a_law_has_no_value(method: str)
     found = dyn.gradient(ball, lambda q, qd, t: q[0], [0.5], [0.0], 1.0, method, wrt="q", **how)
     ends = [dyn.simulate(ball, [0.5 + h], [0.0], 1.0, rtol=1e-12).q[-1, 0] for h in (-1e-6, 1e-6)]
     assert found["q"] == approx((ends[1] - ends[0]) / 2e-6, rel=1e-4)
+
+
+def test_a_block_comes_to_rest_where_a_row_of_forces_begins() -> None:
+    """By steps of 0.5 s it is at v = 0 to the bit there, so that the surface is met at the begin of a step."""
+    block = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2, ["x"], forces=lambda q, qd, t: [-cg.sign(qd[0])])
+    rows = np.array([3.0, 3.0, *[0.0] * 6])[:, None]
+    how: dict[str, Any] = {"tau": rows, "wrt": "tau", "estimate_error": False}
+    found = dyn.gradient(block, lambda q, qd, t: q[0], [0.0], [0.0], 4.0, "euler", **how)
+    assert found.value == 3.0
+    assert found["tau"].ravel().tolist() == [1.5, 1.25, 1.0, 0.75, 0.5, 0.25, 0.0, 0.0]
