@@ -16,9 +16,10 @@ from typing import Any
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import SMOOTH, intervals, kept_by_first
-from cgraph.extend import Builder, building, folded, tangents, topological
+from cgraph.extend import Builder, building, folded, topological
 
 from ..systems.arguments import new_variables
+from ..systems.kinematics import changes
 from ..systems.model import display_names
 from .problem import Problem
 from .switches import Switches
@@ -334,8 +335,7 @@ def _slides(mode: Node, spacing: float) -> Node:
 
 def _along(g: Sequence[Node], seeds: Mapping[Node, Node], build: Builder) -> list[Node]:
     """The derivatives of quantities along a direction."""
-    found = tangents({node: seed for node, seed in seeds.items() if seed.value != 0.0}, list(g), build)
-    return [found.get(node, cg.constant(0.0)) for node in g]
+    return changes({node: seed for node, seed in seeds.items() if seed.value != 0.0}, g, build)
 
 
 def _mixed(start: Node, shares: Sequence[Node], jumps: Sequence[Node]) -> Node:

@@ -12,11 +12,12 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph
 from cgraph._shared import Array, kept_by_first
-from cgraph.extend import Builder, tangents
+from cgraph.extend import Builder
 
 from ...integrators import Problem
 from ...integrators.rate_in_modes import sliding
 from ...integrators.switches import Switches
+from ...systems.kinematics import changes
 from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags
@@ -52,8 +53,7 @@ def _drift(problem: Problem, order: int) -> Graph:
     states, rates = problem.rate.inputs[: problem.size], problem.rate.outputs.values()
     seeds = dict(zip(states, rates, strict=True)) | {problem.rate.inputs[problem.size]: cg.constant(1.0)}
     nodes = list(graph.outputs.values())
-    found = tangents(seeds, nodes, Builder())
-    return cg.simplify(Graph(graph.inputs, {f"{k}": found.get(node, cg.constant(0.0)) for k, node in enumerate(nodes)}))
+    return cg.simplify(Graph(graph.inputs, {f"{k}": dot for k, dot in enumerate(changes(seeds, nodes, Builder()))}))
 
 
 @kept_by_first
