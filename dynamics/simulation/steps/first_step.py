@@ -95,13 +95,20 @@ def _rate(problem: Problem, x: str, t: str, target: str) -> Call:
 
 
 def _tolerance(kinds: StateKinds) -> tuple[Statement, ...]:
-    """Register `tolerance` by the sizes so far: of the component or its group, or OTHERS of the largest of its kind."""
+    """Register `tolerance` by the sizes so far: of the component or its group, or OTHERS of the largest of its kind.
+
+    No less than rounding does to a state at rest within the first step that a look ahead trusts.
+    """
 
     def by_sizes(relative: Node, size: Node, kind: Node) -> Values:
         return {"tolerance": cg.maximum(relative * cg.maximum(size, OTHERS * kind), SMALLEST_ATOL)}
 
     grouped = () if kinds.together is None else (Call(kinds.together, ("size",), ("size",)),)
-    return (*grouped, Call(kinds.largest, ("size",), ("kind",)), each(by_sizes))
+    known = (*grouped, Call(kinds.largest, ("size",), ("kind",)), each(by_sizes))
+    if kinds.floor is None:
+        return known
+    raised = each(lambda tolerance, floor: {"tolerance": cg.maximum(tolerance, floor)})
+    return (*known, Call(kinds.floor, ("reach",), ("floor",)), raised)
 
 
 def _at_rest(kinds: StateKinds) -> list[Statement]:
@@ -134,7 +141,8 @@ def begin(t: Node, t_end: Node, first: Node, wish: Node, longest_step: Node) -> 
         "h_first": h_first,
         "h_look": cg.where(first, first, h_first),
         "look": 1.0,
-        **dict.fromkeys("rounds begins reach".split(), 0.0),
+        "reach": h_first,
+        **dict.fromkeys("rounds begins".split(), 0.0),
     }
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
 
@@ -11,8 +11,10 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array
+from cgraph._shared import Array, error_bounds
+from cgraph.extend import topological
 
+from ...equations.state_equation import state_inputs
 from ...integrators import Problem
 from .row_values import values_of
 
@@ -31,6 +33,7 @@ class StateKinds:
     lengths: tuple[float, ...]  # what 1 stands for beside 1 of others of its kind, see `System.lengths`
     ordinary: bool  # whether it is that of a first-order system, whose components may all round each other
     moved: tuple[tuple[int, ...], ...]  # of a velocity the coordinates that velocities like it move; () of all else
+    floor: Graph | None = None  # what rounding moves a state by in a time, (1) to (m); None if by nothing
 
     def scale(self, size: Array) -> Array:
         """Scale of errors of components that have been so large, (.., m)."""
@@ -93,6 +96,42 @@ def state_kinds(problem: Problem) -> StateKinds:
     still = every if problem.momenta else every[:nq]
     moved = [() if k in still else tuple([j for j in every[:nq] if known[j] == known[k]]) for k in every]
     return StateKinds(tuple(map(kinds.index, kinds)), groups, tuple(lengths), ordinary=False, moved=tuple(moved))
+
+
+def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
+    """The kinds with the floor of their errors: bounds of what rounding does to the neutral state, at rest.
+
+    A body drawn upright in axes that are not the world's rests but for rounding, and steps that resolved the motion
+    that this starts would be without number. Nothing is rounded along the axes of the world.
+    """
+    if problem.system is None or problem.momenta:
+        return kinds
+    known = state_inputs(problem.model).parameters
+    point = dict.fromkeys(problem.rate.input_names, 0.0)
+    point |= {name: float(known[name]) for name in problem.parameters if name in known}
+    point |= dict(zip(problem.states, problem.system.kinematics.neutral, strict=False))
+    pushed, at_once = _rounding(problem.rate, point), np.zeros(problem.size)
+    if problem.projection is not None:
+        at_once = _rounding(problem.projection, point)
+    pushed[: problem.nq] = 0.0
+    if not (pushed.any() or at_once.any()):
+        return kinds
+    turned = np.zeros(problem.size)  # coordinates by the velocities that move them
+    for k, those in enumerate(kinds.moved):
+        for j in those:
+            turned[j] = max(turned[j], pushed[k] * kinds.lengths[k] / kinds.lengths[j])
+    [time] = cg.variables("time")
+    rows = zip(at_once.tolist(), pushed.tolist(), turned.tolist(), strict=True)
+    return replace(kinds, floor=cg.simplify(_numbered([time], [a + time * (b + time * c) for a, b, c in rows])))
+
+
+def _rounding(graph: Graph, point: Mapping[str, float]) -> Array:
+    """Bounds of the rounding errors of the outputs at a point; 0 of one that has no finite bound there."""
+    outputs = list(graph.outputs.values())
+    errors = error_bounds(topological(outputs), {name: point[name] for name in graph.input_names}, 2.0**-53)[1]
+    bounds = np.array([float(errors[node]) for node in outputs])
+    result: Array = np.where(np.isfinite(bounds), bounds, 0.0)
+    return result
 
 
 def off_by(errors: Array, scale: Array, allowed: Array, components: tuple[str, ...]) -> str:

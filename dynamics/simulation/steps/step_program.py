@@ -17,7 +17,7 @@ from ...integrators import Method, Problem
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import projected
 from .first_step import with_first_step
-from .state_sizes import StateKinds, state_kinds
+from .state_sizes import StateKinds, state_kinds, with_floor
 
 KEPT = 8  # programs from elsewhere that a process keeps ready
 
@@ -74,6 +74,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
     """The steps of a method on a problem, all graphs derived; the problem keeps them.  dense: with dense output."""
     steps, kinds = _normalized(method.program(problem, dense), problem, method), state_kinds(problem)
     if method.adaptive:
+        kinds = with_floor(kinds, problem)
         steps = with_first_step(steps, problem, kinds, method.order, starts=method.starts)
     return StepProgram(
         problem.components,

@@ -7,7 +7,7 @@ from pytest import mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
-from tests.dynamics.mechanisms import random_body, random_joint
+from tests.dynamics.mechanisms import random_body, random_joint, random_rotation
 from tests.dynamics.units import Units, in_units
 from tests.slow import slow
 
@@ -59,6 +59,26 @@ def test_a_component_of_rounding_alone_does_not_hold_the_steps(method: str) -> N
     run = dyn.simulate(pendulum, [0.5, 0.0], [0.0, 0.0], 3.0, method, max_steps=5000)
     assert run.success
     assert np.abs(run.q[:, 1]).max() < 1e-9
+
+
+@mark.parametrize("method", ADAPTIVE)
+def test_axes_in_which_bodies_are_drawn_do_not_cost_steps(method: str) -> None:
+    """Rods upright, and three closed to a parallelogram: in turned axes they rest but for rounding."""
+    rng = np.random.default_rng(0)
+    axes = {"world": np.eye(3), **{name: random_rotation(rng) for name in ("left", "top", "right")}}
+
+    def rod(name: str, on: str, place: tuple[float, ...]) -> dyn.Body:
+        joint = dyn.Joint("revolute", axes[name].T @ (0, 1, 0), axes[on].T @ place, axes[on].T @ axes[name])
+        inertia = axes[name].T @ np.diag([0.1, 0.1, 0.0]) @ axes[name]
+        return dyn.Body(name, joint, on, 1.0, axes[name].T @ (0, 0, 0.5), inertia)
+
+    chain = [rod("left", "world", (0, 0, 0)), rod("top", "left", (0, 0, 1))]
+    loop = dyn.Loop("point", "top", "right", at=axes["top"].T @ (2, 0, 0), to_at=axes["right"].T @ (0, 0, 1))
+    for model in (dyn.Mechanism(chain), dyn.Mechanism([*chain, rod("right", "world", (2, 0, 0))], loops=[loop])):
+        start = np.zeros(model.system.n)
+        run = dyn.simulate(model, start, start, 0.5, method, rtol=1e-6, max_steps=60)
+        assert run.success
+        assert 0.0 < np.abs(run.q).max() < 1e-9
 
 
 @mark.parametrize("length", [2.0**40, 2.0**-40])
