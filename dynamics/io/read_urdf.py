@@ -50,7 +50,8 @@ def read_urdf(robot: Recorded, called: str, ignore: bool, floating: bool = False
             add_floating_base(robot)
         macros = {each.tag for each in robot.iter() if each.tag.startswith("xacro:")}
         if macros and (not require_flag("ignore", ignore) or robot.find("link") is None):
-            raise MechanismError(f"this is {XACRO} (the option ignore leaves {listed(sorted(macros))} out)")
+            hint = "" if ignore else f" (the option ignore leaves {listed(sorted(macros))} out)"
+            raise MechanismError(f"this is {XACRO}{hint}")
         _require_plain_joints(robot)
         links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
         root = _root(links, joints)
@@ -70,12 +71,11 @@ def read_urdf(robot: Recorded, called: str, ignore: bool, floating: bool = False
         balls = ([], []) if smooth.contacts is None else _balls(links)
         forces, left = _forces(joints, limits, losses, smooth)
         takeable = any([[*robot.iterfind(f"link/collision/geometry/{shape}")] for shape in BALLS])
-        others = unread(robot)
         what = {
             untaken(takeable): smooth.contacts is None and [*robot.iterfind("link/collision")],
             **left,
             f"limits that cannot be ({listed(impossible)})": impossible,
-            f"what is not read ({'; '.join(others)})": others,
+            f"what is not read ({'; '.join(others := unread(robot))})": others,
         }
         outside = [*present(what), *_negative(inertials, by_digits=True)]
         left_out = refused_or_left_out([*refused, *_negative(inertials, by_digits=False)], outside, ignore)
@@ -204,13 +204,13 @@ def _armatures(robot: Element, joints: Mapping[str, Element], limits: Mapping[st
     for transmission in robot.iter("transmission"):
         kind, where = transmission.findtext("type", transmission.attrib.get("type", "")), "a <transmission>"
         names = [end.get("name", "") for end in transmission.iter("joint") if "SimpleTransmission" in kind]
-        for name in [each for each in names if each in joints and joints[each].get("type") in _SINGLE]:
+        for name in [each for each in names[:1] if each in joints and joints[each].get("type") in _SINGLE]:
             for actuator in transmission.iter("actuator") if limits[name].effort[1] > 0.0 else ():
                 rotor, gear = (_one(actuator, where, f"drake:{what}") for what in ("rotor_inertia", "gear_ratio"))
                 if rotor is not None:
                     transmission.get("name")
                     ratio = 1.0 if gear is None else _numbers(gear, where, "value", 1)[0]
-                    found[name] = found.get(name, 0.0) + ratio**2 * _numbers(rotor, where, "value", 1)[0]
+                    found[name] = found.get(name, 0.0) + ratio * ratio * _numbers(rotor, where, "value", 1)[0]
     return found
 
 

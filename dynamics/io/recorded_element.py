@@ -9,8 +9,8 @@ from .left_out import listed
 
 XACRO = "xacro, not URDF: expand it first, as `xacro robot.urdf.xacro > robot.urdf` does"
 _WITHOUT_MOTION = ("visual", "material", "collision", "type", "hardwareInterface")  # on contacts there is a sentence
-_DRIVES = ("mechanicalReduction", "drake:rotor_inertia", "drake:gear_ratio")
-_FORCES = ("springStiffness", "springReference", "implicitSpringDamper", "turnGravityOff")  # of Gazebo
+_MECHANICS = ("mechanicalReduction", "drake:rotor_inertia", "drake:gear_ratio", "springStiffness", "turnGravityOff")
+_NONE = ("mechanicalReduction 1", "mechanicalReduction 1.0", "turnGravityOff 0", "turnGravityOff false")
 
 
 class Recorded(Element):
@@ -59,4 +59,4 @@ def _unread(element: Recorded, owner: str) -> Iterator[tuple[str, str]]:
 def _changes_motion(element: Element) -> bool:
     """Whether an element of an extension, such as <transmission> or <gazebo>, would change a motion."""
     is_joint = element.tag == "joint" and "type" in element.attrib  # one of SDF, which closes a loop
-    return is_joint or (element.tag in (*_DRIVES, *_FORCES) and (element.text or "").strip() not in ("1", "0", "false"))
+    return is_joint or (element.tag in _MECHANICS and f"{element.tag} {element.text}" not in _NONE)
