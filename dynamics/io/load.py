@@ -19,7 +19,7 @@ from .mujoco_module import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
 from .read_urdf import add_floating_base, origin_of, read_urdf
 from .smooth_forces import smooth
-from .source import called, is_text, root_of, urdf_root
+from .source import called, is_text, require_root, root_of, urdf_root
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -90,6 +90,8 @@ def load_mjcf(
     ('joint 1', 'joint 2')
     """
     given, name = isinstance(source, mujoco().MjModel), called(source)
+    if not given:
+        require_root(source, "mujoco", root_of(source))
     mj = source if given else compiled_mjcf(source, name)
     return warned(read_mjcf(mj, ignore, smooth(limits, friction, actuators, contacts)), "the model" if given else name)
 
@@ -108,8 +110,9 @@ def load_urdf(
     Every link is a body of its name, those without mass and those on fixed joints too, so that `position("tool0")` is
     where that frame is. Coordinates have the names of the joints, in the order of the file, those that carry
     others first. A joint that mimics another is coupled to it by a loop, see `Loop`. Meshes are not read, and
-    need not be there. A link whose moments no rigid body can have is taken as it is, with a warning; of negative
-    moments 0 is taken, without `ignore` only of those that rounding to the digits of the file can make of 0.
+    need not be there. Drake's `drake:rotor_inertia` and `drake:gear_ratio` in the actuator of a simple transmission are
+    the armature gear^2 inertia of its joint. A link whose moments no rigid body can have is taken as it is, with a
+    warning; of negative moments 0 is taken, without `ignore` only of those that rounding can make of 0.
 
     Parameters
     ----------
@@ -117,8 +120,9 @@ def load_urdf(
         A path or the XML text (it starts with "<").
     ignore : bool
         Leave out what a mechanism cannot have: joints that mimic one that is not there, or themselves by way of others,
-        or that have not one coordinate, and negative moments of inertia. Contacts, joint limits, friction loss and
-        extensions of URDF, such as transmissions, are left out, the second and third unless asked for.
+        or that have not one coordinate, negative moments of inertia, and macros of xacro that nobody has expanded.
+        Contacts, joint limits and friction loss are left out unless asked for, and all that is not read, such as
+        transmissions, is left out and named; <visual> and <material> are no part of a mechanism.
     floating : bool
         Whether the root link moves freely, by a joint that is called as the link is. Joints that are floating in the
         file are free in any case. A root link called "world" is then "world'", as "world" is what it moves in.
@@ -184,6 +188,7 @@ def load_at_start(
         raise MechanismError(
             f"floating goes with URDF, and MJCF, as is {called(source)}, says itself which bodies float"
         )
+    require_root(source, "mujoco", root_of(source))
     taken, mj = smooth(limits, friction, actuators, contacts), compiled_mjcf(source, called(source))
     return warned(read_mjcf(mj, ignore, taken), called(source)), tuple(mj.qpos0.tolist())
 

@@ -1,11 +1,11 @@
 """URDF read: the mechanism of a <robot>, with the numbers of the file and the joints that mimic others."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from typing import Any, NamedTuple
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -20,18 +20,15 @@ from ..multibody.loops import Loop
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from .contacts import Ball, capsule_ends, untaken, with_contacts
 from .left_out import follows_itself, listed, present, refused_or_left_out
+from .recorded_element import XACRO, Recorded, unread
 from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
 FAR_LIMIT = 1e9  # in any unit: a limit that is there because URDF asks for one; it stands for none
 BALLS = ("sphere", "capsule")  # shapes whose contacts are taken
 _OTHERS = {"revolute": "revolute", "planar": "planar"}  # beside the words of joint types: a hinge with limits, three
+_SINGLE = ("continuous", "revolute", "prismatic")  # joints with one coordinate
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_KNOWN = {
-    "robot": {"link", "joint", "material"},
-    "link": {"inertial", "visual", "collision"},
-    "joint": {"parent", "child", "origin", "axis", "limit", "dynamics", "mimic", "calibration"},
-}
 
 
 class _Inertial(NamedTuple):
@@ -46,25 +43,44 @@ class _Inertial(NamedTuple):
     digits: float = 0.0
 
 
-def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False, smooth: Smooth = NONE) -> Mechanism:
+def read_urdf(robot: Recorded, called: str, ignore: bool, floating: bool = False, smooth: Smooth = NONE) -> Mechanism:
     """The mechanism of a robot, whose root link stands still or floats. Raises MechanismError with one sentence."""
     try:
         if require_flag("floating", floating):
             add_floating_base(robot)
+        macros = {each.tag for each in robot.iter() if each.tag.startswith("xacro:")}
+        if macros and (not require_flag("ignore", ignore) or robot.find("link") is None):
+            hint = "" if ignore else f" (the option ignore leaves {listed(sorted(macros))} out)"
+            raise MechanismError(f"this is {XACRO}{hint}")
+        _require_plain_joints(robot)
         links, joints = _by_name(robot, "link"), _by_name(robot, "joint")
         root = _root(links, joints)
-        leaders, refused, of_no_effect = read_mimics(joints)
+        leaders, refused = read_mimics(joints)
+        read = {name: _limits(joint, name) for name, joint in joints.items()}
+        limits, impossible = {name: each for name, (each, _) in read.items()}, [name for name in read if read[name][1]]
+        rotors = _armatures(robot, joints, limits)
         with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
             inertials = {name: _inertial(link, name) for name, link in links.items()}
             bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **inertials[root].fields)]
             for name, element in joints.items():
                 parent, child = _end(element, name, "parent"), _end(element, name, "child")
-                bodies.append(Body(child, _joint(element, name, child), parent, **inertials[child].fields))
-        outside = [*_outside(robot, joints, smooth), *of_no_effect, *_negative(inertials, by_digits=True)]
+                own = {"limits": limits[name], "armature": rotors.get(name, 0.0)}
+                bodies.append(Body(child, _joint(element, name, child, own), parent, **inertials[child].fields))
+        losses = {name: loss for name, joint in joints.items() if (loss := _friction(joint, name))}
+        loops, gravity = _couplings(joints, leaders), _gravity(robot)
+        balls = ([], []) if smooth.contacts is None else _balls(links)
+        forces, left = _forces(joints, limits, losses, smooth)
+        takeable = any([[*robot.iterfind(f"link/collision/geometry/{shape}")] for shape in BALLS])
+        what = {
+            untaken(takeable): smooth.contacts is None and [*robot.iterfind("link/collision")],
+            **left,
+            f"limits that cannot be ({listed(impossible)})": impossible,
+            f"what is not read ({'; '.join(others := unread(robot))})": others,
+        }
+        outside = [*present(what), *_negative(inertials, by_digits=True)]
         left_out = refused_or_left_out([*refused, *_negative(inertials, by_digits=False)], outside, ignore)
-        forces, loops = _forces(joints, smooth), _couplings(joints, leaders)
-        mechanism = Mechanism(bodies, _gravity(robot), forces, left_out=left_out, loops=loops)
-        return mechanism if smooth.contacts is None else with_contacts(mechanism, smooth.contacts, *_balls(links))
+        mechanism = Mechanism(bodies, gravity, forces, left_out=left_out, loops=loops)
+        return mechanism if smooth.contacts is None else with_contacts(mechanism, smooth.contacts, *balls)
     except MechanismError as error:
         raise MechanismError(f"URDF, {called}: {error}") from None
 
@@ -85,10 +101,17 @@ def add_floating_base(robot: Element) -> None:
         root = name
     while name in joints:
         name += "'"
-    SubElement(robot, "link", name=WORLD)
-    joint = SubElement(robot, "joint", name=name, type="floating")
-    SubElement(joint, "parent", link=WORLD)
-    SubElement(joint, "child", link=root)
+    joint = Recorded("joint", {"name": name, "type": "floating"})
+    joint.extend([Recorded("parent", {"link": WORLD}), Recorded("child", {"link": root})])
+    robot.extend([Recorded("link", {"name": WORLD}), joint])
+
+
+def _require_plain_joints(robot: Element) -> None:
+    """Raises MechanismError for joints and links of other software's own, such as <drake:joint>."""
+    for each in robot:
+        if each.tag.partition(":")[2] in ("joint", "link"):
+            given = f"<{each.tag}> {each.get('name')!r} of the type {each.get('type')!r}"
+            raise MechanismError(f"{given} is not URDF but an extension, which only its own software reads")
 
 
 def _by_name(robot: Element, tag: str) -> dict[str, Element]:
@@ -127,8 +150,8 @@ def _root(links: Mapping[str, Element], joints: Mapping[str, Element]) -> str:
 
 def _gravity(robot: Element) -> list[float]:
     """Gravity as MuJoCo's extension of URDF has it [m/s^2], else the usual one."""
-    option = robot.find("mujoco/option")
-    return [*GRAVITY] if option is None else _numbers(option, "<mujoco>", "gravity", 3, " ".join(map(repr, GRAVITY)))
+    options = [each for extension in robot.findall("mujoco") for each in extension.findall("option")]
+    return _numbers(options[0], "<mujoco>", "gravity", 3, " ".join(map(repr, GRAVITY))) if options else [*GRAVITY]
 
 
 def _end(joint: Element, name: str, which: str) -> str:
@@ -140,21 +163,55 @@ def _end(joint: Element, name: str, which: str) -> str:
     return link
 
 
-def _joint(joint: Element, name: str, child: str) -> Joint:
-    """The joint, called as in the file."""
+def _joint(joint: Element, name: str, child: str, own: dict[str, Any]) -> Joint:
+    """The joint, called as in the file.  own: its limits and armature."""
     where, word = f"joint {name!r}", joint.get("type")
     kinds = {each.urdf: kind for kind, each in TYPES.items() if each.urdf} | _OTHERS
     if word not in kinds:
-        given = f"is {listed([word])}" if word else "has no type"
-        raise MechanismError(f"{where} {given}, and a mechanism has {', '.join(sorted(kinds))}")
+        given = f"is of the type {listed([word])}" if word else "has no type"
+        raise MechanismError(f"{where} {given}, and URDF has {', '.join(sorted(kinds))}")
     fields: dict[str, Any] = dict(zip(("position", "orientation"), origin_of(joint, where), strict=True))
+    axis = _one(joint, where, "axis")
+    if axis is not None:
+        axis.get("xyz")  # of joints without axis it has no meaning
     if kinds[word] != "fixed":
-        axis, dynamics = _one(joint, where, "axis"), _one(joint, where, "dynamics")
         if kinds[word] in COMPOSITIONS or TYPES[kinds[word]].has_axis:
             fields["axis"] = (1.0, 0.0, 0.0) if axis is None else _numbers(axis, where, "xyz", 3)
-        fields["damping"] = 0.0 if dynamics is None else _numbers(dynamics, where, "damping", 1, "0")[0]
-        fields["limits"] = _possible_limits(joint, name)
+        if kinds[word] == "planar":
+            fields["second_axis"] = _first_in_plane(fields["axis"])
+        dynamics = _one(joint, where, "dynamics")
+        if dynamics is not None:
+            several = kinds[word] == "planar" and len(dynamics.get("damping", "").split()) > 1
+            damping = _numbers(dynamics, where, "damping", 3 if several else 1, "0")
+            fields["damping"] = tuple(damping) if several else damping[0]
+        fields |= own
     return Joint(kinds[word], name="" if name == child else name, **fields)
+
+
+def _first_in_plane(axis: Sequence[float]) -> Array:
+    """Where the shortest turn of z to `axis` takes x, a planar joint's x in MuJoCo 4 and Drake; for -z that is x."""
+    x, y, z = spatial.snapped(spatial.unit(np.asarray(axis)))
+    share = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / (x * x + y * y or 1.0)
+    return np.array([1.0 - share * x * x, -share * x * y, -x])
+
+
+def _armatures(robot: Element, joints: Mapping[str, Element], limits: Mapping[str, Limits]) -> dict[str, float]:
+    """{joint: gear^2 times the inertia of the rotors that drive it [kg m^2 or kg]}, by the extension of Drake's.
+
+    As there, of simple transmissions, on joints of one coordinate whose limit of effort is not 0.
+    """
+    found: dict[str, float] = {}
+    for transmission in robot.iter("transmission"):
+        kind, where = transmission.findtext("type", transmission.attrib.get("type", "")), "a <transmission>"
+        names = [end.get("name", "") for end in transmission.iter("joint") if "SimpleTransmission" in kind]
+        for name in [each for each in names[:1] if each in joints and joints[each].get("type") in _SINGLE]:
+            for actuator in transmission.iter("actuator") if limits[name].effort[1] > 0.0 else ():
+                rotor, gear = (_one(actuator, where, f"drake:{what}") for what in ("rotor_inertia", "gear_ratio"))
+                if rotor is not None:
+                    transmission.get("name")
+                    ratio = 1.0 if gear is None else _numbers(gear, where, "value", 1)[0]
+                    found[name] = found.get(name, 0.0) + ratio * ratio * _numbers(rotor, where, "value", 1)[0]
+    return found
 
 
 def _inertial(link: Element, name: str) -> _Inertial:
@@ -226,8 +283,7 @@ def _numbers(element: Element, where: str, attribute: str, count: int, default: 
         values = []
     if len(values) != count or not all(map(math.isfinite, values)):
         needed = "one finite number" if count == 1 else f"{count} finite numbers"
-        hint = ", with the macros of xacro expanded" if "${" in text else ""
-        raise MechanismError(f"{where}: {attribute} of <{element.tag}> needs {needed}{hint}, got {text!r:.60}")
+        raise MechanismError(f"{where}: {attribute} of <{element.tag}> needs {needed}, got {text!r:.60}")
     return values
 
 
@@ -235,7 +291,8 @@ def _couplings(joints: Mapping[str, Element], leaders: Mapping[str, str]) -> lis
     """The loops q = multiplier q_leader + offset."""
     loops = []
     for name, leader in leaders.items():
-        mimic, where = joints[name].find("mimic"), f"joint {name!r}"
+        where = f"joint {name!r}"
+        mimic = _one(joints[name], where, "mimic")
         assert mimic is not None
         line = [_numbers(mimic, where, "offset", 1, "0")[0], _numbers(mimic, where, "multiplier", 1, "1")[0]]
         body, to = (_end(joints[each], each, "child") for each in (name, leader))
@@ -243,33 +300,26 @@ def _couplings(joints: Mapping[str, Element], leaders: Mapping[str, str]) -> lis
     return loops
 
 
-def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> list[str]:
-    """Sentences on forces and inputs on a mechanism that are not taken."""
-    takeable = any([robot.findall(f"link/collision/geometry/{shape}") for shape in BALLS])
-    limited = [name for name, joint in joints.items() if _limits(joint, name)]
-    wrong = [name for name, joint in joints.items() if _possible_limits(joint, name) is None]
-    rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
-    return present(
-        {
-            untaken(takeable): robot.findall("link/collision") and smooth.contacts is None,
-            f"joint limits ({listed(limited)})": limited and smooth.limits is None,
-            f"limits that cannot be ({listed(wrong)})": wrong,
-            f"friction loss ({listed(rubbing)})": rubbing and smooth.friction is None,
-            f"extensions of URDF ({listed(list(dict.fromkeys(_extensions(robot))))})": [*_extensions(robot)],
-        }
-    )
-
-
-def _forces(joints: Mapping[str, Element], smooth: Smooth) -> list[JointForce]:
-    """The forces of joints that are taken."""
+def _forces(
+    joints: Mapping[str, Element], limits: Mapping[str, Limits], losses: Mapping[str, float], smooth: Smooth
+) -> tuple[list[JointForce], dict[str, object]]:
+    """The forces of joints that are taken, and sentences on those that are not, see `present`."""
     forces: list[JointForce] = []
+    ranges = {name: each.position for name, each in limits.items() if each.position != ANYTHING}
+    points = [name for name, (lower, upper) in ranges.items() if lower == upper]
+    rubbing = [name for name, loss in losses.items() if loss > 0.0 and joints[name].get("type") != "planar"]
     for name, joint in joints.items():
         body = _end(joint, name, "child")
-        if smooth.limits is not None and (ends := _limits(joint, name)):
-            forces.append(smooth.limit(body, *ends))
-        if smooth.friction is not None and (loss := _friction(joint, name)):
-            forces.append(JointFriction(body, loss, smooth.friction))
-    return forces
+        if smooth.limits is not None and name in ranges and name not in points:
+            forces.append(smooth.limit(body, *ranges[name]))
+        if smooth.friction is not None and name in rubbing:
+            forces.append(JointFriction(body, losses[name], smooth.friction))
+    rough = [name for name in losses if smooth.friction is None or name not in rubbing]
+    return forces, {
+        f"joint limits ({listed([*ranges])})": ranges and smooth.limits is None,
+        f"limits whose ends are one number ({listed(points)})": points and smooth.limits is not None,
+        f"friction loss ({listed([f'{name}: {losses[name]:g}' for name in rough])})": rough,
+    }
 
 
 def _balls(links: Mapping[str, Element]) -> tuple[list[Ball], list[str]]:
@@ -281,11 +331,12 @@ def _balls(links: Mapping[str, Element]) -> tuple[list[Ball], list[str]]:
         for collision in link.findall("collision") if name != WORLD else ():
             touching[name] = None
             where = f"the collision of link {name!r}"
-            geometry = _one(collision, where, "geometry")
-            shape = next(iter(geometry), None) if geometry is not None else None
+            shape = collision.find("geometry/*")
             if shape is None or shape.tag not in BALLS:
                 others.append(f"{name}: {'no shape' if shape is None else shape.tag}")
                 continue
+            for geometry in collision.findall("geometry"):
+                geometry.findall(shape.tag)
             center, turn = origin_of(collision, where)
             half = 0.5 * _numbers(shape, where, "length", 1)[0] if shape.tag == "capsule" else 0.0
             radius = _numbers(shape, where, "radius", 1)[0]
@@ -300,66 +351,41 @@ def _balls(links: Mapping[str, Element]) -> tuple[list[Ball], list[str]]:
     return balls, present(sentences)
 
 
-def _limits(joint: Element, name: str) -> tuple[float, float] | None:
-    """The range of a hinge or slide; None without limits."""
-    limit, where = _one(joint, f"joint {name!r}", "limit"), f"joint {name!r}"
-    if limit is None or joint.get("type") not in ("revolute", "prismatic"):
-        return None
-    lower, upper = (_numbers(limit, where, side, 1, "0")[0] for side in ("lower", "upper"))
-    return None if (lower, upper) == (-FAR_LIMIT, FAR_LIMIT) else (lower, upper)
-
-
-def _possible_limits(joint: Element, name: str) -> Limits | None:
-    """Limits of position, velocity and effort; None for such that cannot be."""
-    limit = _one(joint, f"joint {name!r}", "limit")
-    if limit is None or joint.get("type") not in _SINGLE:
-        return NO_LIMITS
-    ends = _limits(joint, name) or (-math.inf, math.inf)
-    lower, upper = (end if abs(end) < FAR_LIMIT else math.copysign(math.inf, end) for end in ends)
-    with suppress(ValueError):
-        velocity, effort = (float(limit.get(what, "inf")) for what in ("velocity", "effort"))
-        return Limits((lower, upper), _both_ways(velocity), _both_ways(effort))
-    return None
-
-
-def _both_ways(size: float) -> tuple[float, float]:
-    return ANYTHING if size >= FAR_LIMIT else (-size, size)
+def _limits(joint: Element, name: str) -> tuple[Limits, bool]:
+    """Limits of a joint of one coordinate, and whether some cannot be, in whose place there are none."""
+    limit, limits, kind = _one(joint, f"joint {name!r}", "limit"), NO_LIMITS, joint.get("type")
+    if limit is None or kind not in _SINGLE:
+        return limits, False
+    impossible = False
+    for what in ("position", "velocity", "effort")[kind == "continuous" :]:
+        texts = [limit.get("lower", "0"), limit.get("upper", "0")] if what == "position" else [limit.get(what, "inf")]
+        try:
+            ends = [math.copysign(math.inf, end) if abs(end := float(text)) >= FAR_LIMIT else end for text in texts]
+            limits = replace(limits, **{what: (ends[0] if len(ends) == 2 else -ends[0], ends[-1])})
+        except ValueError:
+            impossible = True
+    return limits, impossible
 
 
 def _friction(joint: Element, name: str) -> float:
-    dynamics = _one(joint, f"joint {name!r}", "dynamics")
+    dynamics = None if joint.get("type") == "fixed" else _one(joint, f"joint {name!r}", "dynamics")
     return 0.0 if dynamics is None else _numbers(dynamics, f"joint {name!r}", "friction", 1, "0")[0]
 
 
-def _extensions(robot: Element) -> Iterator[str]:
-    """Elements of the robot, its links and its joints that are not URDF's own."""
-    for parent in (robot, *robot.findall("link"), *robot.findall("joint")):
-        for each in parent:
-            alone = [[(inner.tag, *inner.keys()) for inner in each]] == [[("option", "gravity")]]
-            if each.tag not in _KNOWN[parent.tag] and not (each.tag == "mujoco" and alone):
-                yield f"<{each.tag}>"
-
-
-_SINGLE = ("continuous", "revolute", "prismatic")  # joints with one coordinate
-
-
-def read_mimics(joints: Mapping[str, Element]) -> tuple[dict[str, str], list[str], list[str]]:
-    """{joint that mimics another: that one}, and sentences on those that are refused, and on those without effect.
+def read_mimics(joints: Mapping[str, Element]) -> tuple[dict[str, str], list[str]]:
+    """{joint that mimics another: that one}, and sentences on those that are refused; a fixed joint mimics none.
 
     Raises MechanismError for a joint that mimics several.
     """
     leaders: dict[str, str] = {}
-    for name, joint in joints.items():
-        if len(mimics := joint.findall("mimic")) > 1:
-            raise MechanismError(f"joint {name!r} has {len(mimics)} elements <mimic>, and one is needed")
-        if mimics:
-            leaders[name] = mimics[0].get("joint", "")
     kinds = {name: joint.get("type") for name, joint in joints.items()}
-    fixed = [name for name in leaders if kinds[name] == "fixed"]
-    follow = [name for name in leaders if name not in fixed]
-    astray = [name for name in follow if leaders[name] not in joints]
-    circle = [name for name in follow if follows_itself(name, leaders)]
-    others = [name for name in follow if name not in (*astray, *circle)]
+    for name, joint in joints.items():
+        mimic = _one(joint, f"joint {name!r}", "mimic")
+        if mimic is not None and kinds[name] != "fixed":
+            leaders[name] = mimic.get("joint", "")
+    astray = [name for name in leaders if leaders[name] not in joints]
+    circle = [name for name in leaders if follows_itself(name, leaders)]
+    others = [name for name in leaders if name not in (*astray, *circle)]
     several = [name for name in others if not {kinds[name], kinds[leaders[name]]} <= {*_SINGLE}]
     refused = {
         "joints that mimic one that is not there": astray,
@@ -369,7 +395,6 @@ def read_mimics(joints: Mapping[str, Element]) -> tuple[dict[str, str], list[str
     return (
         {name: leaders[name] for name in others if name not in several},
         present({f"{what} ({_after(names, leaders)})": names for what, names in refused.items()}),
-        present({f"fixed joints that mimic others ({_after(fixed, leaders)})": fixed}),
     )
 
 

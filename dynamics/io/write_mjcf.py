@@ -131,9 +131,9 @@ def _joint(body: Body) -> dict[str, Any]:
     kind = getattr(mujoco().mjtJoint, f"mjJNT_{joint.type.mjcf.upper()}")
     fields = {"name": body.coordinate, "type": kind, "damping": joint.damping, "armature": joint.armature}
     if joint.type.has_axis:
-        fields |= {"axis": np.asarray(joint.axis, np.float64), "springref": joint.spring_reference}
-    if joint.type.sprung:
-        fields["stiffness"] = joint.stiffness
+        fields["axis"] = np.asarray(joint.axis, np.float64)
+    springs = {"stiffness": joint.stiffness, "springref": joint.spring_reference}
+    fields |= {name: value for name, value in springs.items() if value}
     limits = joint.limits or NO_LIMITS
     for field, ends in (("range", limits.position), ("actfrcrange", limits.effort)):
         if ends != ANYTHING and ends[0] < ends[1]:  # by a range of no length MuJoCo means none

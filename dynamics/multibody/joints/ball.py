@@ -16,6 +16,7 @@ class Ball(quaternion.QuaternionJoint):
     """A ball joint: a unit quaternion, and the angular velocity in the body's axes [rad/s]."""
 
     kind = mjcf = "ball"
+    urdf = "spherical"
     coordinates = quaternion.NAMES
     velocities = ("wx", "wy", "wz")
     units = quaternion.UNITS

@@ -119,17 +119,6 @@ def test_files_have_the_parts(kind: str) -> None:
     assert error(run(dyn.bias(again), given), run(dyn.bias(mechanism), given)) < TORQUES
 
 
-def test_a_planar_joint_of_urdf() -> None:
-    inertia = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
-    text = (
-        f'<robot name="r"><link name="world"/><link name="puck">{inertia}</link><joint name="j" type="planar">'
-        '<parent link="world"/><child link="puck"/><axis xyz="0 0 1"/><dynamics damping="0.2"/></joint></robot>'
-    )
-    puck = dyn.load_urdf(text)
-    assert puck.coordinates == ("j.x", "j.y", "j.angle")
-    assert puck.system.damping == (0.2, 0.2, 0.2)
-
-
 @mark.parametrize(
     ("joint", "said"),
     [

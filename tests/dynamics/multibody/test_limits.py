@@ -122,10 +122,6 @@ def test_what_are_no_limits_is_told(made: Any, said: str) -> None:
 
 
 def test_what_cannot_be_in_a_file_is_said() -> None:
-    text = urdf(("a", "revolute", 'lower="1" upper="-1"'), ("b", "continuous", 'effort="-3"'))
-    with pytest.warns(dyn.MechanismWarning, match=r"limits that cannot be \(j_a, j_b\)"):
-        arm = dyn.load_urdf(text)
-    assert {*arm.limits.values()} == {dyn.Limits()}
     pytest.importorskip("mujoco")
     half = dyn.Joint("revolute", limits=dyn.Limits((-1.0, math.inf), (0.0, 1.0), (0.0, 0.0)))
     said = "MJCF has no limits of velocity (b) and no limits whose ends are one number (b): left out"

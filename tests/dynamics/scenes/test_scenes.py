@@ -139,7 +139,7 @@ def test_a_file_s_name_does_not_hide_a_scene(file: Any, monkeypatch: pytest.Monk
     ("text", "message"),
     [
         (None, "there is no file "),
-        ("", "{path!r} is not XML, as MJCF and URDF are"),
+        ("", "{path!r} is empty"),
         ("<mujoco><worldbody>", "MuJoCo cannot read "),
         ("not XML", "{path!r} is not XML, as MJCF and URDF are"),
         ("<robot><link/></robot>", "URDF, {path!r}: a link has no name"),
