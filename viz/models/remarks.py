@@ -22,5 +22,5 @@ def tree_alone(scene: scenes.Scene) -> str:
 
 
 def constant_momentum(name: str) -> str:
-    """A sentence for a velocity of `conserved_momenta`."""
+    """A sentence for a velocity whose momentum is conserved."""
     return f"The momentum of {name!r} is constant while no torque acts on it: neither L nor a force depends on it."

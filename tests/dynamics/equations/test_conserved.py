@@ -1,4 +1,4 @@
-"""Conserved momenta: those that are, and no others."""
+"""Conserved quantities: those that are, and no others."""
 
 from dataclasses import replace
 from typing import Any
@@ -98,7 +98,10 @@ def test_a_step_along_a_coordinate_is_not_conserved(name: str, of: str) -> None:
         inertia, potential = (2.0 + step, 0.0) if of == "inertia" else (1.0, step)
         return 0.5 * inertia * qd[0] ** 2 + 0.5 * qd[1] ** 2 * cg.floor(3.0 + cg.sin(t)) - potential
 
-    assert dyn.conserved_momenta(dyn.System(lagrangian, "across along")) == ("along",)
+    found = dyn.conserved(dyn.System(lagrangian, "across along"))
+    assert list(found.quantities) == ["p.along"]
+    assert found.missing["p.across"].endswith("L jumps along it")
+    assert found.missing["energy"] == "L depends on t and L jumps"
 
 
 X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -129,7 +132,8 @@ def test_what_is_conserved_is_named_and_nothing_else(name: str) -> None:
     """By the rates of momenta at random states: 0 of those that are named, and of no other."""
     make, names = CASES[name]
     model = make()
-    assert dyn.conserved_momenta(model) == names
+    found = [each for each in dyn.conserved(model).quantities if each.startswith("p.")]
+    assert found == [f"p.{each}" for each in names]
     system = as_system(model)
     if len(system.constraints):
         return
@@ -138,3 +142,81 @@ def test_what_is_conserved_is_named_and_nothing_else(name: str) -> None:
     rates = graph.evaluate(at | {f"tau{i}": 0.0 for i in range(system.n)})
     for i, velocity in enumerate(system.velocities):
         assert (abs(rates[f"p{i}_dot"]) < 1e-13) == (velocity in names)
+
+
+def particle(**more: Any) -> dyn.System:
+    return dyn.System(lambda q, qd, t, p: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 0.5 * q[0] ** 2, "x y", {"B": 2.0}, **more)
+
+
+def hoop(written: int) -> dyn.System:
+    """A bead on a hoop that is turned, its kinetic energy written in one sum or in two."""
+
+    def lagrangian(q: Any, qd: Any, t: Any, p: Any) -> cg.Node:
+        slung = (p["W"] * cg.sin(q[0])) ** 2
+        kinetic = [0.5 * p["m"] * (qd[0] ** 2 + slung), 0.5 * p["m"] * qd[0] ** 2 + 0.5 * p["m"] * slung][written]
+        return kinetic + 9.81 * p["m"] * cg.cos(q[0])
+
+    return dyn.System(lagrangian, "angle", {"m": 2.0, "W": 3.0})
+
+
+def in_field(q: Any, qd: Any, t: Any) -> cg.Node:
+    return 0.5 * (qd[0] ** 2 + qd[1] ** 2 + qd[2] ** 2) + 2.0 * q[0] * qd[1]
+
+
+def spring_pendulum(q: Any, qd: Any, t: Any) -> cg.Node:
+    return 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) - 4.5 * (q[0] - 1.0) ** 2 + 9.81 * q[0] * cg.cos(q[1])
+
+
+def in_x_and_y(q: Any, qd: Any, t: Any, p: Any) -> cg.Node:
+    return p["m"] * (0.5 * (qd[0] ** 2 + qd[1] ** 2) + 1.0 / cg.hypot(q[0], q[1]))
+
+
+SKATE = {"velocity_constraints": lambda q, qd, t: {"edge": cg.sin(q[0]) * qd[0] - cg.cos(q[0]) * qd[1]}}
+ENERGIES = {
+    "Kepler": (kepler(), {"p.phi", "energy"}),
+    "Kepler in x and y, per mass": (dyn.System(in_x_and_y, "x y", {"m": 2.0}), {"energy"}),
+    "spherical pendulum and spin": (euler_top(), {"p.turn", "p.spin", "energy"}),
+    "spring pendulum": (dyn.System(spring_pendulum, "r angle"), {"energy"}),
+    "charge in a magnetic field": (dyn.System(in_field, "x y z"), {"p.y", "p.z", "energy"}),
+    "charge in a magnetic field, as a force": (
+        particle(forces=lambda q, qd, t, p: [p["B"] * qd[1], -p["B"] * qd[0]]), {"energy"},
+    ),
+    "hoop": (hoop(0), {"Jacobi's integral"}),
+    "hoop in two terms": (hoop(1), {"Jacobi's integral"}),
+    "relativistic": (dyn.System(lambda q, qd, t: -cg.sqrt(9.0 - qd[0] ** 2) - q[0] ** 2, "x"), {"Jacobi's integral"}),
+    "spring in one factor": (dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 - 9.0 * q[0] ** 2), "x"), {"energy"}),
+    "Atwood": (particle(constraints=lambda q, t: {"rope": q[0] + q[1] - 1.0}), {"energy"}),
+    "a track that moves": (particle(constraints=lambda q, t: {"track": q[0] - t}), {"p.y"}),
+    "skate": (particle(**SKATE), {"energy"}),
+    "pushed skate": (
+        particle(velocity_constraints=lambda q, qd, t: {"edge": q[0] * qd[0] - qd[1] - 1.0}), set(),
+    ),
+    "damped": (particle(damping=[0.0, 0.1]), set()),
+    "damped by a parameter": (particle(damping=[cg.variable("B"), 0.0]), {"p.y"}),
+    "driven": (particle(forces=lambda q, qd, t: [0.0, cg.sin(t)]), set()),
+    "arm": (dyn.planar_arm([1.0, 1.0], [1.0, 0.5]), {"energy"}),
+    "damped tree in space": (free_tree((0.0, 0.0, 0.0)), {"p.base.vx", "p.base.vy", "p.base.vz"}),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::dynamics.ConstraintWarning")  # starts are moved onto constraints
+@pytest.mark.parametrize("name", ENERGIES)
+def test_momenta_and_energies_stay_as_they_are_and_others_do_not(name: str) -> None:
+    """Along a motion to 1e-10; each that is missing changes by more than 1e-4."""
+    model, names = ENERGIES[name]
+    found, rng = dyn.conserved(model), np.random.default_rng(3)
+    assert set(found.quantities) == names
+    start = rng.uniform(0.4, 0.9, as_system(model).nq), rng.uniform(0.4, 0.9, len(model.velocities))
+    motion = dyn.simulate(model, *start, 1.0, "dop853", rtol=1e-12, t_eval=[0.0, 0.5, 1.0])
+
+    def along(graph: cg.Graph) -> np.ndarray:
+        return np.column_stack([*dyn.arrays_at(model, graph, motion.q, motion.qd).values()])
+
+    others = dict(zip([f"p.{u}" for u in model.velocities], along(dyn.momentum(model)).T, strict=True))
+    others["energy"] = along(dyn.energy(model))
+    assert set(found.quantities) | set(found.missing) >= set(others) - {"energy"}
+    for each in found.missing:
+        assert np.ptp(others[each]) > 1e-4, each
+    for each, graph in found.quantities.items():
+        row = along(graph)
+        assert np.ptp(row) < 1e-10 * (1.0 + np.abs(row).max()), each

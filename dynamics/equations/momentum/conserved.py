@@ -1,0 +1,185 @@
+"""Conserved quantities: momenta of cyclic coordinates, and the energy or Jacobi's integral, as the graph shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph._shared import columns, shortened
+from cgraph.extend import Builder, as_node, building, cotangents, folded, hessian_nodes, topological
+
+from ...systems.arguments import new_variables
+from ...systems.kinematics import ONE, ZERO, dot
+from ...systems.model import Model, as_system
+from ...systems.system import System, signed_terms
+from ..energies import energy
+from ..equation import called, documented, entries
+from ..equations_of_motion import momentum
+
+ENERGY, JACOBI = "energy", "Jacobi's integral"
+SQUARES = (2.0, 4.0, 6.0)  # powers that are never negative
+
+
+@dataclass(frozen=True)
+class Conserved:
+    """What stays constant in every motion on which no tau acts; see `conserved`.
+
+    Parameters
+    ----------
+    quantities : mapping of str to Graph
+        {"p.<velocity>", "energy" or "Jacobi's integral": its value}, of q0.., qd0.., t if needed and parameters; the
+        output is p0.., E or h.
+    missing : mapping of str to str
+        {another momentum or the energy: why it is not known to be constant}.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> print(dyn.conserved(dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2, ["x"], damping=0.1)))
+    Not known to be constant, as damping acts on it: p.x.
+    Not known to be constant, as a force or damping does work: energy.
+    """
+
+    quantities: Mapping[str, Graph]
+    missing: Mapping[str, str]
+
+    def __str__(self) -> str:
+        """Sentence on what is conserved, and one for each reason why something is not."""
+        lines = [f"Constant while no tau acts: {', '.join(self.quantities)}."] if self.quantities else []
+        for why in dict.fromkeys(self.missing.values()):
+            names = [name for name, reason in self.missing.items() if reason == why]
+            lines.append(f"Not known to be constant, as {why}: {', '.join(names)}.")
+        return "\n".join(lines)
+
+
+@documented
+def conserved(model: Model) -> Conserved:
+    """Momenta p = dL/dqd of cyclic coordinates (Noether), and the energy or Jacobi's integral h = qd dL/dqd - L.
+
+    Proven by structure, so at every state and for all values of the parameters. A momentum is constant where its rate
+    dL/dq + forces - damping * qd, of quasi-velocities G^T dL/dq - ad(u; p) in place of dL/dq, folds to the constant 0,
+    L does not jump along it, and no constraint pulls there. h is constant where L has no t in it and does not jump, the
+    power of forces and damping folds to 0, and rows of constraints vanish at rest: constraints that move do work.
+
+    h is the energy T + V where T is quadratic in qd and vanishes at rest. It is called Jacobi's integral where L is not
+    quadratic in the velocities, or has a sum of squares without them, as T has in a frame that is turned: that of a
+    bead on a hoop is R^2 (qd^2 + w^2 sin(q)^2) / 2. A potential -k q^2 / 2, which drives away, reads like
+    that, too, unless it has the tag "potential".
+
+    Momenta are those of the coordinates that the model has, and not of others: that a planet in x and y keeps its
+    angular momentum is not found, and what is not named may be constant all the same.
+
+    Returns
+    -------
+    Conserved
+
+    Examples
+    --------
+    A planet in polar coordinates: its angular momentum and its energy.
+
+    >>> import dynamics as dyn
+    >>> def planet(q, qd, t):
+    ...     return 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 1.0 / q[0]
+    >>> found = dyn.conserved(dyn.System(planet, "r phi"))
+    >>> print(found)
+    Constant while no tau acts: p.phi, energy.
+    Not known to be constant, as L depends on it: p.r.
+    >>> found.quantities["p.phi"].evaluate({"q0": 2.0, "q1": 0.0, "qd0": 0.0, "qd1": 3.0})
+    {'p1': 12.0}
+    """
+    system = as_system(model)
+    forms = [form for form in (system, system.shortened) if form is not None]
+    name = JACOBI if system.body_terms is None and _moving_frame(system) else ENERGY
+    found = [_reasons(form) | {name: _reason_of_energy(form)} for form in forms]
+    why = {key: min([reasons[key] for reasons in found], key=len) for key in found[0]}  # "" where a form proves it
+    total, momenta = energy(model), momentum(model)
+    outputs = {f"p.{velocity}": {f"p{i}": momenta.outputs[f"p{i}"]} for i, velocity in enumerate(system.velocities)}
+    outputs[name] = {"h" if name is JACOBI else "E": total.outputs["E"]}
+    graphs = {key: called(cg.simplify(Graph(total.inputs, outputs[key])), model) for key in why if not why[key]}
+    return Conserved(graphs, {key: reason for key, reason in why.items() if reason})
+
+
+def _reasons(form: System) -> dict[str, str]:
+    """{momentum: why it is not constant}, empty where it is."""
+    build = Builder()
+    p = new_variables("p", form.n, form.parameters)
+    stated: Sequence[Node] | None = None
+    if form.body_terms is not None:
+        stated = form.body_terms.equations.momentum_rates(form.q, form.qd, p)
+    if stated is None:
+        (lagrangian,) = folded([form.lagrangian], build)
+        bars = cotangents({lagrangian: ONE}, [*form.q, *form.qd], build)
+        stated = form.kinematics.slopes(bars[: form.nq], bars[form.nq :], build)
+    slopes, braking, jumping = folded(stated, build), form.braking(build), _jumping(form)
+    with building(build):
+        rates = [slope + f - brake for slope, f, brake in zip(slopes, form.forces, braking, strict=True)]
+    rates = shortened(folded(rates, build))
+    pulls = [cotangents({rate: ONE}, form.qd, build) for rate in form.constraints.rates]
+    found = {}
+    for i, velocity in enumerate(form.velocities):
+        acting = [name for name, row in zip(form.constraints.names, pulls, strict=True) if row[i].value != 0.0]
+        causes = {
+            "L depends on it": rates[i].value != 0.0 and slopes[i].value != 0.0,
+            "L jumps along it": i in jumping,
+            "a force acts on it": rates[i].value != 0.0 and form.forces[i].value != 0.0,
+            "damping acts on it": rates[i].value != 0.0 and braking[i].value != 0.0,
+            f"constraint {', '.join(map(repr, acting))} acts on it": bool(acting),
+        }
+        found[f"p.{velocity}"] = " and ".join([cause for cause, holds in causes.items() if holds])
+    return found
+
+
+def _reason_of_energy(form: System) -> str:
+    """Why qd dL/dqd - L is not constant, empty where it is."""
+    build, rest = Builder(), dict.fromkeys(form.qd, ZERO)
+    with building(build):
+        power = dot([f - brake for f, brake in zip(form.forces, form.braking(build), strict=True)], form.qd)
+    at_rest = shortened(folded(form.constraints.rates, build, rest))
+    moving = [name for name, rate in zip(form.constraints.names, at_rest, strict=True) if rate.value != 0.0]
+    causes = {
+        "L depends on t": form.t in topological(folded([form.lagrangian], build)),
+        "L jumps": bool(_jumping(form)),
+        "a force or damping does work": shortened(folded([power], build))[0].value != 0.0,
+        f"constraint {', '.join(map(repr, moving))} moves": bool(moving),
+    }
+    return " and ".join([cause for cause, holds in causes.items() if holds])
+
+
+def _moving_frame(system: System) -> bool:
+    """Whether L is not quadratic in the velocities, or a term of it at rest is a sum of squares with weights."""
+    build, state = Builder(), {*system.q, system.t}
+    (lagrangian,) = folded([system.lagrangian], build)
+    if set(system.qd) & set(topological(entries(hessian_nodes(lagrangian, system.qd, build)))):
+        return True
+    (rest,) = folded([lagrangian], build, dict.fromkeys(system.qd, ZERO))
+    terms = [node for sign, node in signed_terms(rest) if sign > 0 and "potential" not in node.tags]
+    odd: dict[Node, frozenset[Node]] = {}  # factors of the state that stand in a product an odd number of times
+    fixed: set[Node] = set()
+    for node in topological(terms):
+        name, args = node.op.name, node.args
+        odd[node] = frozenset({node})
+        if node not in state and fixed.issuperset(args):
+            fixed.add(node)
+            odd[node] = frozenset() if node.value is None or node.value >= 0.0 else odd[node]
+        elif name == "mul" or (name == "div" and args[1] in fixed):
+            odd[node] = odd[args[0]] ^ odd[args[1]]
+        elif (name == "pow" and args[1].value in SQUARES) or (name == "add" and not odd[args[0]] | odd[args[1]]):
+            odd[node] = frozenset()
+    return any([not odd[node] and node not in fixed for node in terms])
+
+
+def _jumping(system: System) -> set[int]:
+    """The velocities along which L jumps, as `floor` and the condition of `where` do: beside a jump its slope is 0."""
+    build = Builder()
+    (lagrangian,) = folded([system.lagrangian], build)
+    moving: set[int] = set()
+    for node in topological([lagrangian]):
+        with building(build):
+            partials = map(as_node, node.op.partials(node, *node.args)) if node.args else ()
+        for arg, partial in zip(node.args, partials, strict=True):
+            if columns(node.op).jumps or partial.value == 0.0:
+                slopes = system.kinematics.slopes(cotangents({arg: ONE}, system.q, build), [ZERO] * system.n, build)
+                moving |= {i for i, slope in enumerate(slopes) if slope.value != 0.0}
+    return moving
