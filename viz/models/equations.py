@@ -166,7 +166,7 @@ def _constraints(system: dyn.System, rows: Rows) -> Block:
 
 
 def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
-    """The torque: written out where that is short, else by its matrices if these are small, else as in the graph."""
+    """The torque written out where that is short; of the chain rule, by matrices where it is long or M is small."""
     system, graph = scene.system, dyn.inverse_dynamics(scene, formulation)
     chain_rule, title = formulation == "chain_rule", f"Torque, {formulation.replace('_', ' ')}"
     if rows.kept:
@@ -176,15 +176,11 @@ def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
     explicit = _statements(graph)
     title = f"{'Torque, τ = dp/dt − ∂L/∂q' if chain_rule else title}{' − Jᵀλ' * bool(rows.kept)}"
     short = all(ink(_right(each)) <= (EXPLICIT if system.n <= 2 else BRIEF) for each in explicit)
-    blocks = [Block(title, explicit)] if short or not chain_rule else []
-    if chain_rule and 2 <= system.n <= MATRICES:
-        blocks.append(_by_matrices(system, rows))
-    if blocks:
-        return blocks
-    damped = any(node.value != 0.0 for node in dyn.damping_force(system).outputs.values())
-    driven = any(node.value != 0.0 for node in system.forces)
-    parts = ["c", "g", *["d"] * damped, *["Q"] * driven, *["J"] * bool(rows.kept)]
-    return [_in_general(title, _letters(system), parts, explicit)]
+    by_matrices = chain_rule and (not short or 2 <= system.n <= MATRICES)
+    return [
+        *[Block(title, explicit)] * (short or not chain_rule),
+        *([_by_matrices(system, rows)] if by_matrices else []),
+    ]
 
 
 def _accelerations(scene: Scene, rows: Rows) -> list[Block]:
@@ -203,33 +199,6 @@ def _letters(system: dyn.System) -> dict[str, Node]:
         name: variable(next(each for each in (*some, f"{name}_{name}") if each not in taken))
         for name, some in LETTERS.items()
     }
-
-
-def _in_general(
-    title: str,
-    letters: Mapping[str, Node],
-    parts: Sequence[str],
-    held: Sequence[tuple[Side, ...]],
-    said: str | None = None,
-    more: str = "",
-) -> Block:
-    """tau = M qdd + c + g + d - Q - J^T lambda, of the parts that there are, then what is held.
-
-    said: solved for qdd, and what is said of that.  more: on M.
-    """
-    inertia = letters["M"] * QDD
-    total = inertia if said is None else TAU
-    for name in parts:
-        part, adds = letters[name], (name in "QJ") == (said is not None)
-        if name == "J":
-            part = part**TRANSPOSED * variable("lambda")
-        total = total + part if adds else total - part
-    general = [(TAU, total)] if said is None else [(inertia, total)]
-    if said is not None and "J" in parts:
-        general.append((letters["J"] * QDD, letters["r"]))
-    told = ["M", *parts, *["r"] * (len(general) - 1)]
-    about = "; ".join([f"{letters[name].name}: {WORDS[name]}{more * (name == 'M')}" for name in told])
-    return Block(title, [*general, *held], f"{said or ''}{about}.")
 
 
 def _by_matrices(system: dyn.System, rows: Rows, said: str | None = None) -> Block:
@@ -260,12 +229,23 @@ def _by_matrices(system: dyn.System, rows: Rows, said: str | None = None) -> Blo
     if wide:  # the lower triangle entry by entry
         held = [(variable(f"M_{i}_{j}"), matrix[i][j]) for i in range(n) for j in range(i + 1)]
     held += [(letters[name], [[entry] for entry in column]) for name, column in kept.items()]
+    solved, inertia = said is not None, letters["M"] * QDD
+    total = TAU if solved else inertia
+    for name in kept:
+        total = total + letters[name] if (name == "Q") == solved else total - letters[name]
+    told = ["M", *kept]
     if slopes:
+        pull = letters["J"] ** TRANSPOSED * variable("lambda")
+        total = total + pull if solved else total - pull
         held.append((letters["J"], found[n + len(PARTS) :]))
-    if slopes and said is not None:
+        told.append("J")
+    held.insert(0, (inertia, total) if solved else (TAU, total))
+    if slopes and solved:
+        held.insert(1, (letters["J"] * QDD, letters["r"]))
         held.append((letters["r"], [[entry] for entry in entries[-len(slopes) :]]))
-    title, parts = f"{'Torque' if said is None else 'Accelerations'} by matrices", [*kept, *["J"] * bool(slopes)]
-    return _in_general(title, letters, parts, held, said, ", symmetric" * wide)
+        told.append("r")
+    about = "; ".join([f"{letters[name].name}: {WORDS[name]}{', symmetric' * (wide and name == 'M')}" for name in told])
+    return Block(f"{'Accelerations' if solved else 'Torque'} by matrices", held, f"{said or ''}{about}.")
 
 
 def _spurious(scene: Scene, formulation: str) -> list[Block]:

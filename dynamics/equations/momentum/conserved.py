@@ -92,8 +92,8 @@ def conserved(model: Model) -> Conserved:
     system = as_system(model)
     forms = [form for form in (system, system.shortened) if form is not None]
     name = JACOBI if system.body_terms is None and _moving_frame(system) else ENERGY
-    found = [_reasons(form) | {name: _reason_of_energy(form)} for form in forms]
-    why = {key: min([reasons[key] for reasons in found], key=len) for key in found[0]}  # "" where a form proves it
+    found = [_reasons(form, name) for form in forms]
+    why = {key: min([" and ".join(reasons[key]) for reasons in found], key=len) for key in found[0]}
     total, momenta = energy(model), momentum(model)
     outputs = {f"p.{velocity}": {f"p{i}": momenta.outputs[f"p{i}"]} for i, velocity in enumerate(system.velocities)}
     outputs[name] = {"h" if name is JACOBI else "E": total.outputs["E"]}
@@ -101,50 +101,39 @@ def conserved(model: Model) -> Conserved:
     return Conserved(graphs, {key: reason for key, reason in why.items() if reason})
 
 
-def _reasons(form: System) -> dict[str, str]:
-    """{momentum: why it is not constant}, empty where it is."""
-    build = Builder()
-    p = new_variables("p", form.n, form.parameters)
+def _reasons(form: System, energy_name: str) -> dict[str, list[str]]:
+    """{name: why it is not constant}, of momenta and the energy; nothing where it is."""
+    build, names, jumping = Builder(), form.constraints.names, _jumping(form)
+    p, (lagrangian,) = new_variables("p", form.n, form.parameters), folded([form.lagrangian], build)
     stated: Sequence[Node] | None = None
     if form.body_terms is not None:
         stated = form.body_terms.equations.momentum_rates(form.q, form.qd, p)
     if stated is None:
-        (lagrangian,) = folded([form.lagrangian], build)
         bars = cotangents({lagrangian: ONE}, [*form.q, *form.qd], build)
         stated = form.kinematics.slopes(bars[: form.nq], bars[form.nq :], build)
-    slopes, braking, jumping = folded(stated, build), form.braking(build), _jumping(form)
+    slopes, braking = folded(stated, build), form.braking(build)
     with building(build):
-        rates = [slope + f - brake for slope, f, brake in zip(slopes, form.forces, braking, strict=True)]
+        pushes = [force - brake for force, brake in zip(form.forces, braking, strict=True)]
+        rates = [slope + push for slope, push in zip(slopes, pushes, strict=True)]
+        power = dot(pushes, form.qd)
     rates = shortened(folded(rates, build))
     pulls = [cotangents({rate: ONE}, form.qd, build) for rate in form.constraints.rates]
     found = {}
     for i, velocity in enumerate(form.velocities):
-        acting = [name for name, row in zip(form.constraints.names, pulls, strict=True) if row[i].value != 0.0]
-        causes = {
-            "L depends on it": rates[i].value != 0.0 and slopes[i].value != 0.0,
-            "L jumps along it": i in jumping,
-            "a force acts on it": rates[i].value != 0.0 and form.forces[i].value != 0.0,
-            "damping acts on it": rates[i].value != 0.0 and braking[i].value != 0.0,
-            f"constraint {', '.join(map(repr, acting))} acts on it": bool(acting),
-        }
-        found[f"p.{velocity}"] = " and ".join([cause for cause, holds in causes.items() if holds])
+        parts = {"L depends": slopes[i], "a force acts": form.forces[i], "damping acts": braking[i]}
+        causes = [f"{part} on it" for part, node in parts.items() if rates[i].value != 0.0 and node.value != 0.0]
+        causes += [
+            f"constraint {name!r} acts on it" for name, row in zip(names, pulls, strict=True) if row[i].value != 0.0
+        ]
+        found[f"p.{velocity}"] = causes + ["L jumps along it"] * (i in jumping)
+    at_rest = shortened(folded(form.constraints.rates, build, dict.fromkeys(form.qd, ZERO)))
+    found[energy_name] = [
+        *["L depends on t"] * (form.t in topological([lagrangian])),
+        *["L jumps"] * bool(jumping),
+        *["a force or damping does work"] * (shortened(folded([power], build))[0].value != 0.0),
+        *[f"constraint {name!r} moves" for name, rate in zip(names, at_rest, strict=True) if rate.value != 0.0],
+    ]
     return found
-
-
-def _reason_of_energy(form: System) -> str:
-    """Why qd dL/dqd - L is not constant, empty where it is."""
-    build, rest = Builder(), dict.fromkeys(form.qd, ZERO)
-    with building(build):
-        power = dot([f - brake for f, brake in zip(form.forces, form.braking(build), strict=True)], form.qd)
-    at_rest = shortened(folded(form.constraints.rates, build, rest))
-    moving = [name for name, rate in zip(form.constraints.names, at_rest, strict=True) if rate.value != 0.0]
-    causes = {
-        "L depends on t": form.t in topological(folded([form.lagrangian], build)),
-        "L jumps": bool(_jumping(form)),
-        "a force or damping does work": shortened(folded([power], build))[0].value != 0.0,
-        f"constraint {', '.join(map(repr, moving))} moves": bool(moving),
-    }
-    return " and ".join([cause for cause, holds in causes.items() if holds])
 
 
 def _moving_frame(system: System) -> bool:
@@ -153,11 +142,11 @@ def _moving_frame(system: System) -> bool:
     (lagrangian,) = folded([system.lagrangian], build)
     if set(system.qd) & set(topological(entries(hessian_nodes(lagrangian, system.qd, build)))):
         return True
-    (rest,) = folded([lagrangian], build, dict.fromkeys(system.qd, ZERO))
+    rest, own = folded([lagrangian, system.kinetic], build, dict.fromkeys(system.qd, ZERO))
     terms = [node for sign, node in signed_terms(rest) if sign > 0 and "potential" not in node.tags]
     odd: dict[Node, frozenset[Node]] = {}  # factors of the state that stand in a product an odd number of times
     fixed: set[Node] = set()
-    for node in topological(terms):
+    for node in topological([*terms, own]):
         name, args = node.op.name, node.args
         odd[node] = frozenset({node})
         if node not in state and fixed.issuperset(args):
@@ -167,7 +156,7 @@ def _moving_frame(system: System) -> bool:
             odd[node] = odd[args[0]] ^ odd[args[1]]
         elif (name == "pow" and args[1].value in SQUARES) or (name == "add" and not odd[args[0]] | odd[args[1]]):
             odd[node] = frozenset()
-    return any([not odd[node] and node not in fixed for node in terms])
+    return (own.value != 0.0 and not odd[own]) or any([not odd[node] and node not in fixed for node in terms])
 
 
 def _jumping(system: System) -> set[int]:

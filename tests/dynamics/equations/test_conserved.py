@@ -186,7 +186,7 @@ ENERGIES = {
     "relativistic": (dyn.System(lambda q, qd, t: -cg.sqrt(9.0 - qd[0] ** 2) - q[0] ** 2, "x"), {"Jacobi's integral"}),
     "spring in one factor": (dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 - 9.0 * q[0] ** 2), "x"), {"energy"}),
     "Atwood": (particle(constraints=lambda q, t: {"rope": q[0] + q[1] - 1.0}), {"energy"}),
-    "a track that moves": (particle(constraints=lambda q, t: {"track": q[0] - t}), {"p.y"}),
+    "a track that moves": (particle(constraints=lambda q, t: {"track": q[0] - cg.sin(3.0 * t)}), {"p.y"}),
     "skate": (particle(**SKATE), {"energy"}),
     "pushed skate": (
         particle(velocity_constraints=lambda q, qd, t: {"edge": q[0] * qd[0] - qd[1] - 1.0}), set(),
