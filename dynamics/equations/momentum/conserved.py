@@ -98,7 +98,7 @@ def conserved(model: Model) -> Conserved:
     outputs = {f"p.{velocity}": {f"p{i}": momenta.outputs[f"p{i}"]} for i, velocity in enumerate(system.velocities)}
     outputs[name] = {"h" if name is JACOBI else "E": total.outputs["E"]}
     graphs = {key: called(cg.simplify(Graph(total.inputs, outputs[key])), model) for key in why if not why[key]}
-    return Conserved(graphs, {key: reason for key, reason in why.items() if reason})
+    return Conserved(graphs, {key.replace(JACOBI, ENERGY): reason for key, reason in why.items() if reason})
 
 
 def _reasons(form: System, energy_name: str) -> dict[str, list[str]]:

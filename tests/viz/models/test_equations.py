@@ -16,6 +16,7 @@ from dynamics.equations.equations_of_motion import momentum
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.momentum.hamiltonian import hamilton_equations
 from dynamics.equations.state_equation import state_equation
+from tests.dynamics.equations.test_constraints import sleigh
 from tests.dynamics.linkages import four_bar
 from tests.each_row import each_row
 from viz import cli
@@ -71,13 +72,6 @@ def rod():
     )  # fmt: skip
 
 
-def skate():
-    return dyn.System(
-        lambda q, qd, t, p: 0.5 * p["J"] * qd[2] ** 2 + 0.5 * (qd[0] ** 2 + qd[1] ** 2), ["x", "y", "a"], {"J": 2.0},
-        velocity_constraints=lambda q, qd, t: {"edge": cg.sin(q[2]) * qd[0] - cg.cos(q[2]) * qd[1] - t},
-    )  # fmt: skip
-
-
 def spatial_arm(n):
     axes = [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)]
     bodies, parent = [], "world"
@@ -103,7 +97,7 @@ def equations_of(model):
 
 MODELS = {name: lambda name=name: dyn.scenes.load(name) for name in dyn.scenes.names()} | {
     make.__name__: lambda make=make: dyn.scenes.of_model(make())
-    for make in (pulley, cart_pole, hoop, relativistic, floating, rod, skate, four_bar)
+    for make in (pulley, cart_pole, hoop, relativistic, floating, rod, sleigh, four_bar)
 } | {
     "arm of 3": lambda: dyn.scenes.of_model(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])),
     "spatial arm of 3": lambda: dyn.scenes.of_model(spatial_arm(3)),
@@ -348,11 +342,6 @@ def test_what_is_left_out_is_said():
         ("equations spring_mass", 0, "tau.theta = I * qdd.theta + k * q.theta"),
         ("equations spring_mass --formulation by_definition", 1, "By definition, the torque is wrong"),
         ("equations spring_mass --formulation by_definition", 1, "tau.theta = dL / dq.theta = -k * q.theta"),
-        (
-            "equations spring_mass --formulation euler_embedded --latex",
-            1,
-            "% By definition, the torque is wrong",
-        ),  # a former name
         ("equations spring_mass --forward", 0, "qdd.theta = (tau.theta - k * q.theta) / I"),
         ("equations spring_mass --momentum", 0, "p_dot.theta = tau.theta - k * q.theta"),
         ("equations triple_pendulum --latex", 0, r"\begin{pmatrix}"),
