@@ -73,15 +73,14 @@ def model_equations(
     A system of first order has its state equation alone. Of a mechanism the Lagrangian is that of the whole tree.
     Raises for momenta of what has none.
     """
-    momenta = of == "momenta"
     if scene.ode is not None:  # which has no momenta, as `hamilton_equations` says
-        graph = dyn.hamilton_equations(scene) if momenta else dyn.state_equation(scene)
+        graph = dyn.hamilton_equations(scene) if of == "momenta" else dyn.state_equation(scene)
         first = dict.fromkeys(scene.parameters, 0) | dict.fromkeys(scene.coordinates, 1)
         return Equations([Block("State equation", _statements(graph, first))], {})
     system, (names, indices) = scene.system, _short_names(scene)
     lagrangian, parts = _lagrangian(scene, indices)
     blocks = [lagrangian, Block("Momenta, p = ∂L/∂q̇", _statements(dyn.momentum(scene))), *_conserved(scene)]
-    if momenta:
+    if of == "momenta":
         blocks.append(Block("Hamilton's equations", _statements(dyn.hamilton_equations(scene))))
     else:
         rows = constraint_rows(system, system.constraints.rates)
@@ -146,10 +145,9 @@ def _right(statement: tuple[Side, ...]) -> Node:
 def _conserved(scene: Scene) -> list[Block]:
     """What is constant in every motion without tau; no block where nothing is known to be."""
     quantities = dyn.conserved(scene).quantities
-    found = [statement for graph in quantities.values() for statement in _statements(graph)]
-    energy = variable("qd") * variable("p") - variable("L")
-    long = [graph for graph in quantities if not graph.startswith("p.") and ink(_right(found[-1])) > EXPLICIT]
-    held = [*found[:-1], (found[-1][0], energy)] if long else found
+    held = [statement for graph in quantities.values() for statement in _statements(graph)]
+    if held and not [*quantities][-1].startswith("p.") and ink(_right(held[-1])) > EXPLICIT:
+        held[-1] = held[-1][0], variable("qd") * variable("p") - variable("L")
     said = f"Constant while no τ acts: {', '.join(quantities)}. Of momenta, those of cyclic coordinates only."
     return [Block("Conserved", held, said)] if held else []
 
@@ -176,11 +174,10 @@ def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
     explicit = _statements(graph)
     title = f"{'Torque, τ = dp/dt − ∂L/∂q' if chain_rule else title}{' − Jᵀλ' * bool(rows.kept)}"
     short = all(ink(_right(each)) <= (EXPLICIT if system.n <= 2 else BRIEF) for each in explicit)
-    by_matrices = chain_rule and (not short or 2 <= system.n <= MATRICES)
-    return [
-        *[Block(title, explicit)] * (short or not chain_rule),
-        *([_by_matrices(system, rows)] if by_matrices else []),
-    ]
+    blocks = [Block(title, explicit)] * (short or not chain_rule)
+    if chain_rule and (not short or 2 <= system.n <= MATRICES):
+        blocks.append(_by_matrices(system, rows))
+    return blocks
 
 
 def _accelerations(scene: Scene, rows: Rows) -> list[Block]:
@@ -233,17 +230,15 @@ def _by_matrices(system: dyn.System, rows: Rows, said: str | None = None) -> Blo
     total = TAU if solved else inertia
     for name in kept:
         total = total + letters[name] if (name == "Q") == solved else total - letters[name]
-    told = ["M", *kept]
+    told = ["M", *kept, *["J"] * bool(slopes), *["r"] * (bool(slopes) and solved)]
     if slopes:
         pull = letters["J"] ** TRANSPOSED * variable("lambda")
         total = total + pull if solved else total - pull
         held.append((letters["J"], found[n + len(PARTS) :]))
-        told.append("J")
     held.insert(0, (inertia, total) if solved else (TAU, total))
     if slopes and solved:
         held.insert(1, (letters["J"] * QDD, letters["r"]))
         held.append((letters["r"], [[entry] for entry in entries[-len(slopes) :]]))
-        told.append("r")
     about = "; ".join([f"{letters[name].name}: {WORDS[name]}{', symmetric' * (wide and name == 'M')}" for name in told])
     return Block(f"{'Accelerations' if solved else 'Torque'} by matrices", held, f"{said or ''}{about}.")
 

@@ -78,8 +78,8 @@ class Page(str):
     __slots__ = ()
 
     def __repr__(self) -> str:
-        title = self.partition("<title>")[2].partition("</title>")[0]
-        return f"<Page {unescape(title)!r:.60} of {len(self)} characters>"
+        title = unescape(self.partition("<title>")[2].partition("</title>")[0])
+        return f"<Page {title!r:.60} of {len(self)} characters>"
 
     def _repr_html_(self) -> str:
         return (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import cgraph as cg
@@ -10,16 +10,15 @@ from cgraph import Graph, Node
 from cgraph._shared import columns, shortened
 from cgraph.extend import Builder, as_node, building, cotangents, folded, hessian_nodes, topological
 
-from ...systems.arguments import new_variables
 from ...systems.kinematics import ONE, ZERO, dot
 from ...systems.model import Model, as_system
 from ...systems.system import System, signed_terms
 from ..energies import energy
 from ..equation import called, documented, entries
 from ..equations_of_motion import momentum
+from .hamiltonian import momentum_slopes
 
 ENERGY, JACOBI = "energy", "Jacobi's integral"
-SQUARES = (2.0, 4.0, 6.0)  # powers that are never negative
 
 
 @dataclass(frozen=True)
@@ -104,14 +103,10 @@ def conserved(model: Model) -> Conserved:
 def _reasons(form: System, energy_name: str) -> dict[str, list[str]]:
     """{name: why it is not constant}, of momenta and the energy; nothing where it is."""
     build, names, jumping = Builder(), form.constraints.names, _jumping(form)
-    p, (lagrangian,) = new_variables("p", form.n, form.parameters), folded([form.lagrangian], build)
-    stated: Sequence[Node] | None = None
-    if form.body_terms is not None:
-        stated = form.body_terms.equations.momentum_rates(form.q, form.qd, p)
-    if stated is None:
-        bars = cotangents({lagrangian: ONE}, [*form.q, *form.qd], build)
-        stated = form.kinematics.slopes(bars[: form.nq], bars[form.nq :], build)
-    slopes, braking = folded(stated, build), form.braking(build)
+    (lagrangian,) = folded([form.lagrangian], build)
+    momenta = cotangents({lagrangian: ONE}, form.qd, build)
+    slopes = folded(momentum_slopes(form, lagrangian, momenta, build), build)
+    braking = form.braking(build)
     with building(build):
         pushes = [force - brake for force, brake in zip(form.forces, braking, strict=True)]
         rates = [slope + push for slope, push in zip(slopes, pushes, strict=True)]
@@ -154,7 +149,7 @@ def _moving_frame(system: System) -> bool:
             odd[node] = frozenset() if node.value is None or node.value >= 0.0 else odd[node]
         elif name == "mul" or (name == "div" and args[1] in fixed):
             odd[node] = odd[args[0]] ^ odd[args[1]]
-        elif (name == "pow" and args[1].value in SQUARES) or (name == "add" and not odd[args[0]] | odd[args[1]]):
+        elif (name == "pow" and args[1].value in (2.0, 4.0)) or (name == "add" and not odd[args[0]] | odd[args[1]]):
             odd[node] = frozenset()
     return (own.value != 0.0 and not odd[own]) or any([not odd[node] and node not in fixed for node in terms])
 
