@@ -164,7 +164,7 @@ def _constraints(system: dyn.System, rows: Rows) -> Block:
 
 
 def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
-    """The torque written out where that is short; of the chain rule, by matrices where it is long or M is small."""
+    """The torque: written out where that is short, else by its matrices if these are small, else as in the graph."""
     system, graph = scene.system, dyn.inverse_dynamics(scene, formulation)
     chain_rule, title = formulation == "chain_rule", f"Torque, {formulation.replace('_', ' ')}"
     if rows.kept:
@@ -174,10 +174,9 @@ def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
     explicit = _statements(graph)
     title = f"{'Torque, τ = dp/dt − ∂L/∂q' if chain_rule else title}{' − Jᵀλ' * bool(rows.kept)}"
     short = all(ink(_right(each)) <= (EXPLICIT if system.n <= 2 else BRIEF) for each in explicit)
-    blocks = [Block(title, explicit)] * (short or not chain_rule)
-    if chain_rule and (not short or 2 <= system.n <= MATRICES):
-        blocks.append(_by_matrices(system, rows))
-    return blocks
+    small = chain_rule and 2 <= system.n <= MATRICES
+    blocks = [Block(title, explicit)] * (short or not small)
+    return [*blocks, _by_matrices(system, rows)] if small else blocks
 
 
 def _accelerations(scene: Scene, rows: Rows) -> list[Block]:

@@ -95,7 +95,8 @@ def conserved(model: Model) -> Conserved:
     why = {key: min([" and ".join(reasons[key]) for reasons in found], key=len) for key in found[0]}
     total, momenta = energy(model), momentum(model)
     outputs = {f"p.{velocity}": {f"p{i}": momenta.outputs[f"p{i}"]} for i, velocity in enumerate(system.velocities)}
-    outputs[name] = {"h" if name is JACOBI else "E": total.outputs["E"]}
+    letter = "h" if name is JACOBI else "E"
+    outputs[name] = {letter + "_" * (letter in system.parameters): total.outputs["E"]}
     graphs = {key: called(cg.simplify(Graph(total.inputs, outputs[key])), model) for key in why if not why[key]}
     return Conserved(graphs, {key.replace(JACOBI, ENERGY): reason for key, reason in why.items() if reason})
 
