@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         SingularMassMatrixError as SingularMassMatrixError,
         raise_if_singular as raise_if_singular,
     )
-    from .equations.momentum.conserved_momenta import conserved_momenta as conserved_momenta
+    from .equations.momentum.conserved import conserved as conserved
     from .equations.momentum.hamiltonian import hamilton_equations as hamilton_equations, hamiltonian as hamiltonian
     from .equations.state_equation import state_equation as state_equation
     from .equations.states.consistent_state import consistent_state as consistent_state

@@ -127,7 +127,7 @@ LINK = {"joint": dyn.Joint("revolute"), "mass": 1.0, "inertia": (0.1, 0.1, 0.1)}
 SCENE = (ARM, (0.0,), (0.0,), 1.0)
 FIRST, LAST = TWO.bodies[0].name, TWO.bodies[1].name
 RUNS = {"dt": 0.01, "max_steps": 100, "backend": "python", "fma": False, "estimate_error": False, "progress": False}
-MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian conserved_momenta coriolis damping_force
+MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian conserved coriolis damping_force
     base_parameters display_names energy gravity_force inertial_parameters inverse_dynamics_derivatives
     inverse_mass_matrix kinetic_energy mass_matrix momentum potential_energy regressor
     torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""

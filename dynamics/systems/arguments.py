@@ -65,6 +65,8 @@ def coefficients(
 ) -> tuple[float | Node, ...]:
     """A number of at least 0, or a node, for each of the named coordinates. Raises ValueError."""
     entries = [value] * len(names) if isinstance(value, numbers.Real | Node) else sequence(f"{what} must be", value)
+    if any([hasattr(each, "__len__") for each in entries]):
+        raise ValueError(f"{what} takes a number for each velocity; a matrix D is forces=lambda q, qd, t, p: -D @ qd")
     known = per_coordinate(what, [0.0 if isinstance(each, Node) else each for each in entries], names, minimum=0.0)
     return tuple([each if isinstance(each, Node) else number for each, number in zip(entries, known, strict=True)])
 

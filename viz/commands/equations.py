@@ -1,4 +1,4 @@
-"""`cgraph equations`: the Lagrangian, the momenta and the torques of a scene as formulas, in text or LaTeX."""
+"""`cgraph equations`: Lagrangian, momenta, and torques or accelerations of a scene as formulas, in text or LaTeX."""
 
 import argparse
 
@@ -16,6 +16,9 @@ def add(parser: Command) -> None:
     which.add_argument(
         "--formulation", type=formulation, choices=FORMULATIONS, help="of the torque (default: chain_rule)"
     )
+    which.add_argument(
+        "--forward", action="store_true", help="accelerations, and multipliers of constraints, in place of the torque"
+    )
     which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of the torque")
     parser.add_argument(
         "--lines", type=counting, default=200, metavar="N", help="of each block, at most (default: 200)"
@@ -24,7 +27,6 @@ def add(parser: Command) -> None:
         "--digits", type=counting, default=DIGITS, metavar="N", help=f"of numbers (default: {DIGITS}; 17 are all)"
     )
     parser.add_argument("--latex", action="store_true", help="print as LaTeX")
-    parser.set_defaults(forward=False)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -33,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
     if scene.ode is not None and options.formulation is not None:
         raise ValueError(f"{scene.name} is a system of first order: it has no torque, so no --formulation of it")
     options.formulation = options.formulation or "chain_rule"
-    equations = library.model_equations(scene, formulation=options.formulation, momenta=options.momentum)
+    of = "accelerations" if options.forward else "momenta" if options.momentum else "torque"
+    equations = library.model_equations(scene, of=of, formulation=options.formulation)
     written = library.equations_latex if options.latex else library.equations_text
     text = written(equations, options.lines, options.digits)
     verdict = verdict_of(options, scene)

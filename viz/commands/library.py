@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from ..models.inspection_page import first_view, inspection_page
     from ..models.live_motion import live
     from ..models.node_classes import form_classes, formulation_classes
-    from ..models.remarks import constant_momentum, tree_alone
+    from ..models.remarks import tree_alone
     from ..models.typed_text import typed_text
     from ..pages import pruning_page, stability_page, work_precision_page
     from ..pages.document import check_folder, document_files

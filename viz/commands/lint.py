@@ -68,15 +68,15 @@ def run(options: argparse.Namespace) -> int:
     proof = lint_text(report, verdict)
     proof = proof if scene.ode is None else f"Holds: equations of first order have no velocities.\n{report}"
     ok = not faults and not (verdict and verdict.differs)
-    conserved = dyn.conserved_momenta(scene) if scene.ode is None else ()
-    proof += "".join([f"\n{library.constant_momentum(name)}" for name in conserved])
+    conserved = dyn.conserved(scene) if scene.ode is None else None
+    proof += f"\n{conserved}" if conserved else ""
     forms = {library.LAGRANGE: dyn.state_equation(scene), library.HAMILTON: graph} if options.momentum else {}
     sizes = size_data(forms) if forms else {}
     proof += f"\n{size_table(sizes)}" if sizes else ""
     alone = "" if options.forward else library.tree_alone(scene)
     proof = f"{proof}\n{alone}" if alone else proof
     data = {"scene": scene.name, "equations": what, "of_the_tree": bool(alone)} | report.to_dict()
-    data |= {"conserved": list(conserved), "ok": ok}
+    data |= {"conserved": list(conserved.quantities) if conserved else [], "ok": ok}
     data |= {"verdict": verdict.to_dict()} if verdict else {}
     data |= {"sizes": sizes} if sizes else {}
     answer_and_draw(

@@ -173,12 +173,12 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
     graph = names.graph
     stops = cg.why_not(graph, output, options.input, names=dyn.display_names(scene))
     alone = "" if options.forward else library.tree_alone(scene)
-    source, conserved = names.meant(options.input), dyn.conserved_momenta(scene) if options.momentum else ()
+    source, conserved = names.meant(options.input), dyn.conserved(scene).quantities if options.momentum else {}
     told = [  # of a momentum whose rate was asked for, or whose coordinate the rate was asked by
-        library.constant_momentum(name)
+        f"The momentum of {name!r} is constant while no torque acts on it: neither L nor a force depends on it."
         for i, name in enumerate(scene.velocities)
         if output == f"p{i}_dot" or (source == f"q{i}" and scene.coordinates[i] == name)
-        if name in conserved
+        if f"p.{name}" in conserved
     ]
     data = {"depends": False, "of_the_tree": bool(alone)} | stops.to_dict()
     data |= {"constant": "\n".join(told)} if told else {}

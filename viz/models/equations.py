@@ -5,16 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import cgraph as cg
+import dynamics as dyn
 from cgraph import Graph, Node, variable
 from cgraph._shared import Side, counted, ink, is_letter, reading_form
-from dynamics.equations.equations_of_motion import bias, damping_force, gravity_force, mass_matrix, momentum
-from dynamics.equations.formulations.formulations import inverse_dynamics
-from dynamics.equations.formulations.verdict import formulation_verdict
-from dynamics.equations.momentum.hamiltonian import hamilton_equations
-from dynamics.equations.state_equation import state_equation
+from cgraph.extend import Builder, cotangents
+from dynamics.equations.constraints.constraints import Rows, constraint_rows
 from dynamics.scenes import Scene
-from dynamics.systems.model import display_names
-from dynamics.systems.system import System
+from dynamics.systems.kinematics import ONE, ZERO
 
 from ..pages.mathml import ranks
 
@@ -22,9 +19,12 @@ EXPLICIT, BRIEF = 130.0, 45.0  # symbols of an equation that is written out, of 
 LARGEST, FEW_INPUTS = 120, 16  # nodes of a graph that is written out, of so few inputs; of more inputs a third
 MATRICES = 4  # velocities up to which M is shown as a matrix
 MOST_PARTS = 8  # partial Lagrangians whose sum is shown
-LETTERS = {"M": "MHA", "c": "cbC", "g": "gnG", "d": "dD", "Q": "QFu"}  # the first that is no parameter is taken
+# The first that is no parameter is taken.
+LETTERS = {"M": "MHA", "c": "cbC", "g": "gnG", "d": "dD", "Q": "QFu", "J": "JWB", "r": "rhs"}
 WORDS = {"M": "inertia", "c": "velocities", "g": "weight and springs", "d": "damping", "Q": "applied forces"}
+WORDS |= {"J": "constraints, a row each", "r": "what J q̈ has to be"}
 PARTS = ("c", "g", "d", "Q")  # of the torque, beside M qdd
+TAU, QDD, TRANSPOSED = cg.variables("tau qdd T")
 # Formulations with Euler's step: what is differentiated through it, and how the torque is said to be had.
 EMBEDDED = {"by_definition": ("L", "by definition"), "kinetic_only": ("K", "by the kinetic energy alone")}
 
@@ -62,38 +62,43 @@ class Equations:
 
 
 def model_equations(
-    scene: Scene, *, formulation: str = "chain_rule", momenta: bool = False, compare: Sequence[str] = ()
+    scene: Scene, *, of: str = "torque", formulation: str = "chain_rule", compare: Sequence[str] = ()
 ) -> Equations:
-    """The equations of a scene: Lagrangian, momenta, and the torque or Hamilton's equations.
+    """The equations of a scene: Lagrangian, momenta, what is conserved, and the torque or what else is asked for.
 
-    formulation: of the torque.  momenta: Hamilton's equations in place of it.  compare: formulations of which a block
-    says what they have too much, where they differ from the chain rule; beside `formulation`.
+    of: "torque", "accelerations", with the multipliers of constraints, or "momenta", Hamilton's equations.
+    formulation: of the torque.  compare: formulations of which a block says what they have too much, where they
+    differ from the chain rule; beside `formulation`.
 
     A system of first order has its state equation alone. Of a mechanism the Lagrangian is that of the whole tree.
     Raises for momenta of what has none.
     """
     if scene.ode is not None:  # which has no momenta, as `hamilton_equations` says
-        graph = hamilton_equations(scene) if momenta else state_equation(scene)
+        graph = dyn.hamilton_equations(scene) if of == "momenta" else dyn.state_equation(scene)
         first = dict.fromkeys(scene.parameters, 0) | dict.fromkeys(scene.coordinates, 1)
         return Equations([Block("State equation", _statements(graph, first))], {})
     system, (names, indices) = scene.system, _short_names(scene)
     lagrangian, parts = _lagrangian(scene, indices)
-    blocks = [lagrangian, Block("Momenta, p = ∂L/∂q̇", _statements(momentum(scene)))]
-    if momenta:
-        blocks.append(Block("Hamilton's equations", _statements(hamilton_equations(scene))))
+    blocks = [lagrangian, Block("Momenta, p = ∂L/∂q̇", _statements(dyn.momentum(scene))), *_conserved(scene)]
+    if of == "momenta":
+        blocks.append(Block("Hamilton's equations", _statements(dyn.hamilton_equations(scene))))
     else:
-        blocks += _torque(scene, formulation)
+        rows = constraint_rows(system, system.constraints.rates)
+        if len(system.constraints):
+            blocks.append(_constraints(system, rows))
+        blocks += _accelerations(scene, rows) if of == "accelerations" else _torque(scene, formulation, rows)
         chosen = dict.fromkeys([each for each in (formulation, *compare) if each in EMBEDDED])
         blocks += [block for each in chosen for block in _spurious(scene, each)]
     more = {f"tau_def{i}": f"tau_def.{names[f'tau{i}'].partition('.')[2]}" for i in range(system.n)}
     more |= {f"∂q{i}": f"∂{names[f'q{i}']}" for i in range(system.nq)}
     more |= {f"M_{i}_{j}": f"M_{i + 1}_{j + 1}" for i in range(system.n) for j in range(system.n)}
+    more |= {f"z{k}": f"z.{name}" for k, name in enumerate(system.constraints.names)}
     return Equations(blocks, {**names, **more, **parts}, indices)
 
 
 def _short_names(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
     """Display names, and what indices stand for: of names alike but for a number at their end, the number."""
-    names, called = display_names(scene), dict.fromkeys((*scene.coordinates, *scene.velocities))
+    names, called = dyn.display_names(scene), dict.fromkeys((*scene.coordinates, *scene.velocities))
     matches = {name: re.fullmatch(r"(.*[^0-9])([0-9]+)", name) for name in called}
     stems = {match.group(1) if match else None for match in matches.values()}
     stem = stems.pop() if len(stems) == 1 else None
@@ -137,26 +142,53 @@ def _right(statement: tuple[Side, ...]) -> Node:
     return right
 
 
-def _torque(scene: Scene, formulation: str) -> list[Block]:
+def _conserved(scene: Scene) -> list[Block]:
+    """What is constant in every motion without tau; no block where nothing is known to be."""
+    quantities = dyn.conserved(scene).quantities
+    held = [statement for graph in quantities.values() for statement in _statements(graph)]
+    if held and not [*quantities][-1].startswith("p.") and ink(_right(held[-1])) > EXPLICIT:
+        held[-1] = held[-1][0], variable("qd") * variable("p") - variable("L")
+    said = f"Constant while no τ acts: {', '.join(quantities)}. Of momenta, those of cyclic coordinates only."
+    return [Block("Conserved", held, said)] if held else []
+
+
+def _constraints(system: dyn.System, rows: Rows) -> Block:
+    """The rows that hold the system, each with its multiplier in the equations of motion."""
+    known, names = system.constraints, system.constraints.names
+    nodes = [(*known.positions, *known.velocities)[k] for k in rows.kept]
+    outputs = {f"z{k}": node for k, node in zip(rows.kept, nodes, strict=True)}
+    held = [(*each, ZERO) for each in _statements(cg.simplify(system.graph(outputs, system.q, system.qd)))]
+    left = [name for k, name in enumerate(names) if k not in rows.kept]
+    said = f" Those that follow from them have no force: {', '.join(left)}." if left else ""
+    return Block("Constraints", held, f"Their forces are Jᵀλ, J the slopes of their rates by velocities.{said}")
+
+
+def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
     """The torque: written out where that is short, else by its matrices if these are small, else as in the graph."""
-    system, graph = scene.system, inverse_dynamics(scene, formulation)
-    title = f"Torque, {formulation.replace('_', ' ')}"
+    system, graph = scene.system, dyn.inverse_dynamics(scene, formulation)
+    chain_rule, title = formulation == "chain_rule", f"Torque, {formulation.replace('_', ' ')}"
+    if rows.kept:
+        pulls = cotangents(dict(zip(rows.rates, rows.multipliers, strict=True)), system.qd)
+        torques = {name: tau - pull for (name, tau), pull in zip(graph.outputs.items(), pulls, strict=True)}
+        graph = cg.simplify(Graph([*graph.inputs, *rows.multipliers], torques))
     explicit = _statements(graph)
-    if formulation != "chain_rule":
-        return [Block(title, explicit)]
-    title = "Torque, τ = dp/dt − ∂L/∂q"
+    title = f"{'Torque, τ = dp/dt − ∂L/∂q' if chain_rule else title}{' − Jᵀλ' * bool(rows.kept)}"
     short = all(ink(_right(each)) <= (EXPLICIT if system.n <= 2 else BRIEF) for each in explicit)
-    blocks = [Block(title, explicit)] if short else []
-    if 2 <= system.n <= MATRICES:
-        blocks.append(_by_matrices(system))
-    if blocks:
-        return blocks
-    damped = any(node.value != 0.0 for node in damping_force(system).outputs.values())
-    driven = any(node.value != 0.0 for node in system.forces)
-    return [_in_general(title, _letters(system), ["c", "g", *["d"] * damped, *["Q"] * driven], explicit)]
+    small = chain_rule and 2 <= system.n <= MATRICES
+    blocks = [Block(title, explicit)] * (short or not small)
+    return [*blocks, _by_matrices(system, rows)] if small else blocks
 
 
-def _letters(system: System) -> dict[str, Node]:
+def _accelerations(scene: Scene, rows: Rows) -> list[Block]:
+    """Accelerations and multipliers written out where that is short; else, or of few, the system that they solve."""
+    explicit = _statements(dyn.forward_dynamics(scene))
+    short = all(ink(_right(each)) <= EXPLICIT for each in explicit)
+    said = "" if short else "The accelerations written out are too long to print; they are what solves this. "
+    by_matrices = [_by_matrices(scene.system, rows, said)] if scene.system.n > 1 or not short else []
+    return [*[Block("Accelerations", explicit)] * short, *by_matrices]
+
+
+def _letters(system: dyn.System) -> dict[str, Node]:
     """{part of the torque: its letter}, none that is a parameter."""
     taken = {str(node.name) for node in system.extra_inputs}
     return {
@@ -165,32 +197,27 @@ def _letters(system: System) -> dict[str, Node]:
     }
 
 
-def _in_general(
-    title: str, letters: Mapping[str, Node], parts: Sequence[str], held: Sequence[tuple[Side, ...]], more: str = ""
-) -> Block:
-    """tau = M qdd + c + g + d - Q, of the parts that there are, then what is held.  more: on M."""
-    total = letters["M"] * variable("qdd")
-    for name in parts:
-        total = total - letters[name] if name == "Q" else total + letters[name]
-    about = "; ".join([f"{letters[name].name}: {WORDS[name]}{more * (name == 'M')}" for name in ("M", *parts)])
-    return Block(title, [(variable("tau"), total), *held], f"{about}.")
+def _by_matrices(system: dyn.System, rows: Rows, said: str | None = None) -> Block:
+    """tau = M qdd + c + g + d - Q - J^T lambda: inertia, Coriolis force, gravity and springs, damping, forces, pulls.
 
-
-def _by_matrices(system: System) -> Block:
-    """tau = M qdd + c + g + d - Q: inertia, Coriolis and centrifugal force, gravity and springs, damping, forces."""
-    n, forces = system.n, bias(system)
-    gravity = list(gravity_force(system).outputs.values())
+    said: of M qdd = tau - .. and J qdd = r, which accelerations solve; None for the torque.
+    """
+    n, forces = system.n, dyn.bias(system)
+    gravity = list(dyn.gravity_force(system).outputs.values())
     coriolis = [whole - part for whole, part in zip(forces.outputs.values(), gravity, strict=True)]
+    slopes = [cotangents({z: ONE}, system.qd) for z in rows.rates]
     nodes = [
-        *mass_matrix(system).outputs.values(),
+        *dyn.mass_matrix(system).outputs.values(),
         *coriolis,
         *gravity,
-        *damping_force(system).outputs.values(),
+        *dyn.damping_force(system).outputs.values(),
         *system.forces,
+        *[slope for row in slopes for slope in row],
+        *[-rate for rate in system.constraints.rate_changes(rows.rates, Builder())],
     ]
     entries = reading_form(nodes, ranks(forces.input_names))
-    rows = [entries[i * n : (i + 1) * n] for i in range(n + len(PARTS))]
-    matrix, columns = rows[:n], zip(PARTS, rows[n:], strict=True)
+    found = [entries[i * n : (i + 1) * n] for i in range(n + len(PARTS) + len(slopes))]
+    matrix, columns = found[:n], zip(PARTS, found[n : n + len(PARTS)], strict=True)
     kept = {name: column for name, column in columns if any(each.value != 0.0 for each in column)}
     letters = _letters(system)
     wide = max([sum([ink(entry) for entry in row]) for row in matrix]) > EXPLICIT / 2
@@ -198,12 +225,26 @@ def _by_matrices(system: System) -> Block:
     if wide:  # the lower triangle entry by entry
         held = [(variable(f"M_{i}_{j}"), matrix[i][j]) for i in range(n) for j in range(i + 1)]
     held += [(letters[name], [[entry] for entry in column]) for name, column in kept.items()]
-    return _in_general("Torque by matrices", letters, list(kept), held, ", symmetric" * wide)
+    solved, inertia = said is not None, letters["M"] * QDD
+    total = TAU if solved else inertia
+    for name in kept:
+        total = total + letters[name] if (name == "Q") == solved else total - letters[name]
+    told = ["M", *kept, *["J"] * bool(slopes), *["r"] * (bool(slopes) and solved)]
+    if slopes:
+        pull = letters["J"] ** TRANSPOSED * variable("lambda")
+        total = total + pull if solved else total - pull
+        held.append((letters["J"], found[n + len(PARTS) :]))
+    held.insert(0, (inertia, total) if solved else (TAU, total))
+    if slopes and solved:
+        held.insert(1, (letters["J"] * QDD, letters["r"]))
+        held.append((letters["r"], [[entry] for entry in entries[-len(slopes) :]]))
+    about = "; ".join([f"{letters[name].name}: {WORDS[name]}{', symmetric' * (wide and name == 'M')}" for name in told])
+    return Block(f"{'Accelerations' if solved else 'Torque'} by matrices", held, f"{said or ''}{about}.")
 
 
 def _spurious(scene: Scene, formulation: str) -> list[Block]:
     """What a formulation with Euler's step has too much, where it has."""
-    verdict, system = formulation_verdict(scene, formulation), scene.system
+    verdict, system = dyn.formulation_verdict(scene, formulation), scene.system
     quasi = system.kinematics.quasi is not None
     if not verdict.differs or verdict.terms is None or not verdict.excess:
         return []
@@ -220,7 +261,7 @@ def _spurious(scene: Scene, formulation: str) -> list[Block]:
         held.append((left, right) if quasi else (left, slope, right))
     if system.n > MATRICES or quasi:
         slope = variable(f"∂{energy}") / variable("∂q")
-        held.insert(0, (variable("tau_def") - variable("tau"), variable("Gᵀ") * slope if quasi else slope))
+        held.insert(0, (variable("tau_def") - variable("tau"), variable("G") ** TRANSPOSED * slope if quasi else slope))
     about = (
         f"What the torque {had}, τ_def, has too much, however small the time step dt is: q = q̇ dt + q_old makes the "
         "momentum depend on q̇ through q as well. A further part, dt times the rate of this one, tends to 0 with dt."

@@ -55,7 +55,7 @@ def model_html(model: Model) -> str:
     if scene.ode is None and scene.system.n > LARGEST:
         return f"{said}<p>Its equations are long: {COMMAND}</p>"
     equations = model_equations(scene)
-    blocks = [block for block in equations.blocks if not block.title.startswith("Momenta")]
+    blocks = [block for block in equations.blocks if not block.title.startswith(("Momenta", "Conserved"))]
     shown = equations_html(replace(equations, blocks=blocks), level=4)
     return f'<style>{STYLE}</style>{said}<div style="max-width:100%">{shown}</div>'
 

@@ -28,6 +28,9 @@ FILM = 10.0  # s, a length that is offered
 class Animation(bytes):
     """The bytes of a GIF; a notebook plays it."""
 
+    def __repr__(self) -> str:
+        return f"<Animation of {len(self)} bytes>"
+
     def _repr_html_(self) -> str:
         return f'<img src="data:image/gif;base64,{base64.b64encode(self).decode()}" style="max-width:100%">'
 

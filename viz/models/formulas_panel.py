@@ -60,7 +60,7 @@ def formulas_panel(scene: Scene, *, momenta: bool = False) -> Panel:
     heading, where the page shows a version that is wrong.
     """
     compare = () if momenta or scene.ode is not None else ("by_definition", "kinetic_only")
-    equations = model_equations(scene, momenta=momenta, compare=compare)
+    equations = model_equations(scene, of="momenta" if momenta else "torque", compare=compare)
     first = next((block for block in equations.blocks if block.wrong), None)
     others = replace(equations, blocks=[each for each in equations.blocks if each is not first])
     head, inside = "", equations_html(others, LINES)

@@ -1,4 +1,4 @@
-"""Sentences on a model: that inverse dynamics is that of its tree, and that a momentum is constant."""
+"""A sentence on a model: that inverse dynamics is that of its tree."""
 
 from dynamics import scenes
 
@@ -19,8 +19,3 @@ def tree_alone(scene: scenes.Scene) -> str:
     return (
         f"Inverse dynamics is that of the tree, without the forces of the {what} {names}: forward dynamics has these."
     )
-
-
-def constant_momentum(name: str) -> str:
-    """A sentence for a velocity of `conserved_momenta`."""
-    return f"The momentum of {name!r} is constant while no torque acts on it: neither L nor a force depends on it."

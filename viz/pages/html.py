@@ -6,7 +6,7 @@ import json
 import os
 import re
 from collections.abc import Mapping
-from html import escape
+from html import escape, unescape
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
@@ -76,6 +76,10 @@ class Page(str):
     """The HTML text of a page; a notebook shows it in a frame."""
 
     __slots__ = ()
+
+    def __repr__(self) -> str:
+        title = unescape(self.partition("<title>")[2].partition("</title>")[0])
+        return f"<Page {title!r:.60} of {len(self)} characters>"
 
     def _repr_html_(self) -> str:
         return (

@@ -78,9 +78,9 @@ def ranks(names: Iterable[str]) -> dict[str, int]:
     """Ranks of the inputs of graphs of mechanics, see `reading_form`: parameters, coordinates, rates, forces."""
     found = {}
     for name in sorted(names, key="t".__eq__):  # of parameters time is the last
-        kind = symbol(name) if re.fullmatch(r"(q|qd|qdd|p|tau)\d+(_\w+)?", name) else None
+        kind = symbol(name) if re.fullmatch(r"(q|qd|qdd|p|tau|lambda)\d+(_\w+)?", name) else None
         place = {"": 1, "dot": 3, "ddot": 4}[kind.accent] if kind else 0
-        found[name] = {"p": 3, "tau": 5}.get(kind.word, place) if kind else 0
+        found[name] = {"p": 3, "tau": 5, "lambda": 5}.get(kind.word, place) if kind else 0
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import get_args
 
 import cgraph as cg
@@ -136,12 +137,7 @@ def missing_momenta(system: System) -> Graph | None:
 def _equations(system: System, iterations: int, check: bool, order: Order) -> Graph:
     build = Builder()
     transform = Legendre(system, build, iterations, order)
-    stated = None
-    if system.body_terms is not None:
-        stated = system.body_terms.equations.momentum_rates(system.q, system.qd, transform.p)
-    if stated is None:
-        gradient = cotangents({transform.lagrangian: ONE}, system.q, build)
-        stated = system.kinematics.slopes(gradient, transform.p, build)
+    stated = momentum_slopes(system, transform.lagrangian, transform.p, build)
     braking = system.braking(build)
     with building(build):
         rates = [
@@ -154,6 +150,13 @@ def _equations(system: System, iterations: int, check: bool, order: Order) -> Gr
     if check:
         outputs |= _missing(transform)
     return cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
+
+
+def momentum_slopes(system: System, lagrangian: Node, p: Sequence[Node], build: Builder) -> Sequence[Node]:
+    """The rates of momenta p without forces, G^T dL/dq - ad(u; p).  lagrangian: folded."""
+    terms = system.body_terms
+    stated = None if terms is None else terms.equations.momentum_rates(system.q, system.qd, p)
+    return stated or system.kinematics.slopes(cotangents({lagrangian: ONE}, system.q, build), p, build)
 
 
 def _missing(transform: Legendre) -> dict[str, Node]:

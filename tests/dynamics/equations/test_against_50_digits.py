@@ -4,6 +4,7 @@ import numpy as np
 from pytest import approx, mark
 
 import dynamics as dyn
+from cgraph.extend import topological
 from dynamics import as_system
 from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import MODELS, at, run, states
@@ -30,6 +31,10 @@ def test_momentum_its_rate_and_the_gravity_force_are_dl_dqd_its_rate_and_dp_dq(n
     system = as_system(MODELS[name]())
     state = at(states(system, 1), 0)
     terms = lagrange(system, state)
+    parts = system.graph({"L": system.lagrangian, "K": system.kinetic, "P": system.potential}, system.q, system.qd)
+    whole, kinetic, potential = run(parts, state)
+    assert kinetic - potential == approx(whole, rel=ROUNDING, abs=ROUNDING)
+    assert not set(system.qd) & set(topological([system.potential]))
     assert run(dyn.momentum(system), state) == approx(floats(terms.momentum), rel=ROUNDING, abs=ROUNDING)
     expected = approx(floats(terms.momentum_rate), rel=0.0, abs=ROUNDING * terms.largest)
     assert run(dyn.momentum_rate(system), state) == expected

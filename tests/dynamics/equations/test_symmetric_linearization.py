@@ -149,6 +149,3 @@ def test_what_has_no_such_linearization_is_said() -> None:
         dyn.linearize(dyn.System(bead, ["x"]), [0.0], [0.0], form="momentum")
     with pytest.raises(ValueError, match="form must be"):
         dyn.state_space(SMALL["cart"](), form="momenta")
-    named = dyn.System(lambda q, qd, t, p: p["p0"] * qd[0] ** 2, ["x"], {"p0": 1.0})
-    with pytest.raises(ValueError, match="parameter 'p0' has the name of a momentum"):
-        dyn.state_space(named, form="momentum")

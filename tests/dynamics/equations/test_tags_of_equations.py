@@ -28,13 +28,6 @@ def test_every_operation_has_a_tag_and_some_come_of_the_potential(model: str, gr
     assert [node for node in derived.nodes if "potential" in node.tags]
 
 
-def test_every_gravity_force_is_made_of_products_that_come_of_the_potential() -> None:
-    graph = dyn.gravity_force(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]))
-    for name, node in graph.outputs.items():
-        nodes = cg.Graph(graph.inputs, {name: node}).nodes
-        assert [each for each in nodes if each.op.name == "mul" and "potential" in each.tags]
-
-
 def test_derivatives_say_whose_they_are() -> None:
     graph = dyn.inverse_dynamics_derivatives(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]))
     for name, bodies in (("M_1_1", {"link 3"}), ("dtau_dqd_1_1", {"link 3"}), ("dtau_dq_2_0", {"link 3"})):

@@ -78,7 +78,7 @@ HELD: dict[str, Callable[[], tuple[Array, Array]]] = {
 ELSEWHERE = {
     *("certify", "freedom", "raise_if_singular", "release"),  # tests of what they say
     *("gradient", "gradient_many"),  # tests of gradients, which are compared with sensitivities
-    *("hamiltonian", "hamilton_equations", "conserved_momenta"),  # which refuse it, and name what it does not hold
+    *("hamiltonian", "hamilton_equations", "conserved"),  # which refuse it, and name what it does not hold
     "to_mjcf",  # tests of files
     *("arrays_at", "display_names"),  # numbers and names of any graph
 }

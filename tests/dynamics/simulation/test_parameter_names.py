@@ -59,7 +59,7 @@ DOORS: dict[str, Callable[[dyn.System], Any]] = {
     **{f"gradient {name}": lambda system, name=name: slope(system, name) for name in ("rk4", "midpoint")},
     "taylor": lambda system: dyn.simulate(system, *START, 0.1, "taylor", t_eval=[0.1], backend="python").q,
     "linearize": lambda system: np.hstack(dyn.linearize(system, *START)),
-    "conserved": lambda system: [name == "y" for name in dyn.conserved_momenta(system)],
+    "conserved": lambda system: [name == "p.y" for name in dyn.conserved(system).quantities],
 }
 
 

@@ -112,10 +112,10 @@ def test_a_file_with_a_coordinate_that_nothing_uses_and_with_forces_and_torques(
         assert f'["{name}","{unit}"]' in text
 
 
-def test_lint_names_momenta_that_are_constant(own, said, figures):
-    assert "momentum of 'phi' is constant" in said("lint", "own.py:planet")
-    assert figures("lint", "own.py:planet")["conserved"] == ["phi"]
-    assert "is constant" not in said("lint", "spring_mass")
+def test_lint_names_what_is_conserved(own, said, figures):
+    assert "Constant while no tau acts: p.phi, energy." in said("lint", "own.py:planet")
+    assert figures("lint", "own.py:planet")["conserved"] == ["p.phi", "energy"]
+    assert "Not known to be constant, as a force or damping does work: energy." in said("lint", "triple_pendulum")
 
 
 @pytest.mark.filterwarnings("always::dynamics.MechanismWarning")

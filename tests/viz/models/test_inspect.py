@@ -27,6 +27,7 @@ def test_a_model_has_its_page_from_a_start_that_shows_something(tmp_path):
     assert path.read_text(encoding="utf-8") == page
     assert NOTICE in page
     assert "<title>A &lt;b&gt;pendulum&lt;/b&gt;</title>" in page
+    assert re.fullmatch(r"<Page '.*A <b>pendulum</b>.*' of \d+ characters>", repr(page))
 
 
 def test_the_page_of_momenta_has_both_forms_their_rows_and_a_machine_of_momenta():
