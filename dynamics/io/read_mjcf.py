@@ -226,7 +226,8 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     losses = [f"{name}: {mj.dof_frictionloss[i]:g}" for name, i in zip(names, rubbed, strict=True)]
     mocap = [_body_names(mj)[i] for i in np.flatnonzero(mj.body_mocapid >= 0)]
     weightless = _any(mj, "body_gravcomp") and not disabled(mj, "GRAVITY")
-    balancing = np.flatnonzero(mj.jnt_actgravcomp & mj.jnt_actfrclimited).tolist() if weightless else []
+    none_acts = not mj.nu or disabled(mj, "ACTUATION")
+    balancing = np.flatnonzero(mj.jnt_actgravcomp & (mj.jnt_actfrclimited | none_acts)).tolist() if weightless else []
     left = [i for i in range(actuators(mj)) if not (smooth.actuators and modelled(mj, i))]
     acting = {} if disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in left}
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
@@ -237,7 +238,7 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
         f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,
         f"friction loss of tendons ({_tendons(mj, pulling['loss'])})": pulling["loss"] and rubbing,
         f"motions of mocap bodies, which stand where the file has them ({listed(mocap)})": mocap,
-        f"ranges of actuators that balance weight ({listed(_joint_names(mj, balancing))})": balancing,
+        f"ranges, or lack, of actuators that balance weight ({listed(_joint_names(mj, balancing))})": balancing,
         f"actuators ({len(acting) - len(servos)})": len(acting) > len(servos),
         f"actuators that act with no input ({listed(servos)})": servos,
     }

@@ -119,13 +119,10 @@ def _is_wrench(mj: MjModel, i: int) -> bool:
 
 def fixed_tendon(mj: MjModel, tendon: int) -> dict[int, float]:
     """{joint: coefficient} of a fixed tendon, empty for a spatial one."""
-    result: dict[int, float] = {}
-    for k in range(mj.tendon_adr[tendon], mj.tendon_adr[tendon] + mj.tendon_num[tendon]):
-        if int(mj.wrap_type[k]) != int(mujoco().mjtWrap.mjWRAP_JOINT):
-            return {}
-        joint = int(mj.wrap_objid[k])
-        result[joint] = result.get(joint, 0.0) + float(mj.wrap_prm[k])
-    return result
+    rows = range(mj.tendon_adr[tendon], mj.tendon_adr[tendon] + mj.tendon_num[tendon])
+    if any([int(mj.wrap_type[k]) != int(mujoco().mjtWrap.mjWRAP_JOINT) for k in rows]):
+        return {}
+    return {int(mj.wrap_objid[k]): float(mj.wrap_prm[k]) for k in rows}
 
 
 def is_linear(mj: MjModel, tendon: int) -> bool:

@@ -112,16 +112,13 @@ class Loop:
     @property
     def label(self) -> str:
         """Name of the loop, with which those of its rows begin."""
-        return self.name or " to ".join([", ".join([f"{name}" for name, _ in _shares(end)]) for end in self._ends])
+        ends = [", ".join([f"{name}" for name, _ in _shares(end)]) for end in (self.body, self.to)]
+        return self.name or " to ".join(ends)
 
     @property
     def bodies(self) -> tuple[str, ...]:
         """Names of all its bodies, "world" among them."""
-        return tuple([name for end in self._ends for name, _ in _shares(end)])
-
-    @property
-    def _ends(self) -> tuple[str | Mapping[str, float], str | Mapping[str, float]]:
-        return self.body, self.to
+        return tuple([name for name, _ in [*_shares(self.body), *_shares(self.to)]])
 
     @property
     def rows(self) -> tuple[str, ...]:

@@ -36,16 +36,18 @@ def with_start(scene: Known, start: Start) -> Known:
         if start not in named:
             form = "a start is such as q0=0.5,qd0=1, or all numbers of q and qd"
             raise ValueError(f"there is no start {start!r:.80}; {or_nearest(start, [*named]) if named else form}")
-        scene = _with_parameters(scene, named[start])
+        given = {name: value for name, value in named[start].items() if name in scene.parameters}
+        if given and scene.mechanism:
+            scene = replace(scene, model=replace(scene.mechanism, parameters={**scene.mechanism.parameters, **given}))
         start = {name: value for name, value in named[start].items() if name in _meant(scene)}
     states = [*scene.coordinates, *(() if scene.ode else scene.velocities)]
     values = [*scene.q, *scene.qd]
     if not isinstance(start, Mapping):
-        given = real_array("start", start)
-        if given.shape != (len(values),):
+        numbers = real_array("start", start)
+        if numbers.shape != (len(values),):
             shown = ", ".join(_names(scene)[:12]) + (", .." if len(states) > 12 else "")
-            raise ValueError(f"the start needs {len(values)} numbers ({shown}), got {given.size}")
-        values = given.tolist()
+            raise ValueError(f"the start needs {len(values)} numbers ({shown}), got {numbers.size}")
+        values = numbers.tolist()
     else:
         meant = _meant(scene)
         taken: dict[int, str] = {}
@@ -95,13 +97,6 @@ def start(model: Model, key: str | int) -> tuple[Array, Array]:
     numbered = not isinstance(key, str) and scene.mechanism is not None and bool(scene.mechanism.starts)
     scene = with_start(scene, [real_number("key", key)] if numbered else str(key))
     return np.array(scene.q), np.array(scene.qd)
-
-
-def _with_parameters(scene: Known, given: Mapping[str, float]) -> Known:
-    changed = {name: value for name, value in given.items() if name in scene.parameters}
-    if not (changed and scene.mechanism):
-        return scene
-    return replace(scene, model=replace(scene.mechanism, parameters={**scene.mechanism.parameters, **changed}))
 
 
 def moving_start(scene: Scene) -> Scene:

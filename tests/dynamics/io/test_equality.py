@@ -45,8 +45,6 @@ OTHERS = {
     "connect sites": '<connect site1="on tool" site2="on c"/>',
     "weld sites": '<weld site1="on tool" site2="on c"/>',
     "weld": '<weld body1="b2" body2="d" anchor="0.3 0.1 0.2" torquescale="0.2"/>',
-    "connect to the world": '<connect body1="d" anchor="0.1 0.2 0.3"/>',
-    "weld at origins": '<weld body1="b" body2="d"/>',
     "weld apart": '<weld body1="tool" body2="c" relpose="0.1 0.2 0.3 1 1 0.5 0" anchor="0.2 0.3 -0.1"/>',
     "weld to the world": '<weld body1="d"/>',
 }

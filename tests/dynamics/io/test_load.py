@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest import approx, importorskip, mark, raises, warns
+from pytest import importorskip, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
@@ -118,19 +118,6 @@ def test_a_model_by_hand_agrees() -> None:
     assert mechanism.system.coordinates == ("yaw", "pitch", "out", "body 4", "cart")
     assert [body.name for body in mechanism.moving] == ["upper yaw", "upper pitch", "upper", "body 4", "cart"]
     assert np.asarray(mechanism.gravity).tolist() == [1.0, 2.0, -9.0]
-
-
-def test_q_is_qpos_also_with_a_reference() -> None:
-    """At q = 0 the hinge is 30 degrees before, and the slide 0.3 m short of, where the file places them."""
-    turn, slide = agrees(
-        mjcf(
-            f"""<body name="a"><joint axis="0 0 1" ref="30"/>{INERTIAL}
-            <body name="b"><joint type="slide" axis="0 1 0" ref="0.3"/>{INERTIAL}</body></body>"""
-        )
-    ).moving
-    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
-    assert np.asarray(turn.joint.orientation) == approx(np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
-    assert np.asarray(slide.joint.position) == approx([0.0, -0.3, 0.0])
 
 
 @recent
