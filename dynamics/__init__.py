@@ -66,6 +66,7 @@ if TYPE_CHECKING:
         JointForce as JointForce,
         JointFriction as JointFriction,
         JointLimit as JointLimit,
+        JointSpring as JointSpring,
     )
     from .multibody.quantities.base_parameters import base_parameters as base_parameters
     from .multibody.quantities.frames import (
@@ -97,6 +98,7 @@ if TYPE_CHECKING:
     from .multibody.trees.structure import Subtree as Subtree
     from .multiprecision.reference import reference as reference
     from .scenes.scenes import Scene as Scene
+    from .scenes.start import start as start
     from .simulation.applied_force import SampledController as SampledController
     from .simulation.ensembles.ensemble import Ensemble as Ensemble
     from .simulation.ensembles.simulate_many import simulate_many as simulate_many

@@ -266,7 +266,9 @@ CALLS = {
         limits=None
     ),
     "dyn.Limits": call(dyn.Limits, (-1.0, 1.0), velocity=(-1.0, 1.0), effort=(-1.0, 1.0)),
-    "dyn.Body": call(with_body, "b", dyn.Joint("revolute"), "world", 1.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1)),
+    "dyn.Body": call(with_body, "b", dyn.Joint("revolute"), "world", 1.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1), 0.5),
+    "dyn.start": call(dyn.start, dyn.Mechanism(ARM.bodies, starts={"home": {}}), "home"),
+    "dyn.JointSpring": call(on_joint(dyn.JointSpring), "b", 1e3, 0.1, -1.0, 1.0),
     "dyn.JointLimit": call(on_joint(dyn.JointLimit), "b", -1.0, 1.0, 1e3, 0.1),
     "dyn.JointFriction": call(on_joint(dyn.JointFriction), "b", 1.0, 0.1),
     "dyn.Actuator": call(
@@ -283,7 +285,9 @@ CALLS = {
         closed, "b", "world", (0, 0, 0), (0, 0, 0), (0, 0, 1), 1.0, [0.0, 1.0], "loop", 2e-4
     ),
     "dyn.Event": call(dyn.Event, "e", lambda q, qd, t: q[0], 0, False, None),
-    "dyn.Mechanism": call(dyn.Mechanism, [body()], (0.0, 0.0, -9.81), (), {}, {}, False, left_out=(), loops=()),
+    "dyn.Mechanism": call(
+        dyn.Mechanism, [body()], (0.0, 0.0, -9.81), (), {}, {}, False, left_out=(), loops=(), starts={}
+    ),
     "dyn.OdeSystem": call(dyn.OdeSystem, lambda x, t: [-x[0]], ["x"], {}),
     "dyn.System": call(
         dyn.System, lagrangian, ["a"], {}, None, 0.0, None, constraints=None, velocity_constraints=None, body_terms=None
@@ -464,6 +468,7 @@ LEFT_OUT = """cg.as_jax cg.to_casadi cg.to_jax cg.to_torch cg.recording_lines cg
     cg.Graph.counts cg.Graph.listing cg.Graph.only_output dyn.System.braking dyn.System.changed
     dyn.System.mass_matrix dyn.System.require_known dyn.System.require_values dyn.JointForce.along
     dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along dyn.JointFriction.check
+    dyn.JointSpring.along dyn.JointSpring.check
     dyn.Actuator.along dyn.Actuator.check extend.Builder extend.Runner extend.require_length
     extend.Runner.read extend.Runner.write extend.effects extend.Runner.lane_code extend.Formulas.lines
     extend.Runner.text extend.Program.listing

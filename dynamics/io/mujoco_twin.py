@@ -37,8 +37,9 @@ class MujocoTwin:
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
         self.mechanism = require_mechanism(of, "MuJoCo").bind()
-        merged = self.mechanism.moving
-        bodies = [replace(body, joint=replace(body.joint, limits=None)) for body in merged]
+        balanced = any([body.gravity_compensation for body in self.mechanism.parts])
+        parts = self.mechanism.parts if balanced else self.mechanism.moving
+        bodies = [replace(body, joint=replace(body.joint, limits=None)) for body in parts]
         self.model = mujoco_spec(replace(self.mechanism, bodies=bodies, locked={}, loops=()), timestep).compile()
         self.data = self.mujoco.MjData(self.model)
 

@@ -16,12 +16,12 @@ from ..multibody.bodies.body import WORLD, Body, MechanismError
 from ..multibody.loops import Loop
 from .left_out import listed, present
 from .mujoco_module import mujoco
-from .smooth_forces import disabled
+from .smooth_forces import disabled, fixed_tendon
 
 if TYPE_CHECKING:
     from mujoco import MjModel
 
-_MODELLED = ("joint", "connect", "weld")
+_MODELLED = ("joint", "connect", "weld", "tendon")
 
 
 class End(NamedTuple):
@@ -53,7 +53,7 @@ def other_equalities(mj: MjModel) -> list[str]:
     """Sentences on active constraints that no loop stands for."""
     others: dict[str, list[int]] = {}
     for i in _active(mj):
-        if _kind(mj, i) not in _MODELLED:
+        if not _is_modelled(mj, i):
             others.setdefault(_kind(mj, i), []).append(i)
     return [f"equality constraints of the type {kind} ({_names(mj, which)})" for kind, which in others.items()]
 
@@ -79,7 +79,12 @@ def _active(mj: MjModel) -> list[int]:
 
 def _modelled(mj: MjModel) -> list[int]:
     """Active constraints that are loops."""
-    return [i for i in _active(mj) if _kind(mj, i) in _MODELLED]
+    return [i for i in _active(mj) if _is_modelled(mj, i)]
+
+
+def _is_modelled(mj: MjModel, i: int) -> bool:
+    tendons = [int(t) for t in (mj.eq_obj1id[i], mj.eq_obj2id[i]) if t >= 0] if _kind(mj, i) == "tendon" else []
+    return _kind(mj, i) in _MODELLED and all([fixed_tendon(mj, t) for t in tendons])
 
 
 def _kind(mj: MjModel, i: int) -> str:
@@ -89,7 +94,7 @@ def _kind(mj: MjModel, i: int) -> str:
 
 def _loop(mj: MjModel, i: int, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> Loop:
     kind, name = _kind(mj, i), mj.equality(i).name
-    if kind == "joint":
+    if kind in ("joint", "tendon"):
         return _coupling(mj, i, name, moving)
     body, to = _sites(mj, i, ends) or _frames(mj, i, ends)
     if body.body == to.body:
@@ -106,13 +111,21 @@ def _loop(mj: MjModel, i: int, moving: Sequence[Body], ends: Sequence[tuple[str,
 def _coupling(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Loop:
     """q - q0 = c0 + c1 (q_to - q0_to) + .., as a polynomial of q_to; c0 alone without another joint."""
     one, other = int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])
-    starts = mj.qpos0[mj.jnt_qposadr]
+    starts = mj.tendon_length0 if _kind(mj, i) == "tendon" else mj.qpos0[mj.jnt_qposadr]
+    body = _coupled(mj, i, one, moving)
     if other < 0:
         held = float(mj.eq_data[i, 0] + starts[one])
-        return Loop("coupling", moving[one].name, coefficients=[held], name=name)
+        return Loop("coupling", body, coefficients=[held], name=name)
     shifted = Polynomial(mj.eq_data[i, :5])(Polynomial([-starts[other], 1.0])) + float(starts[one])
     coefficients = [float(x) for x in np.trim_zeros(shifted.coef, "b")]
-    return Loop("coupling", moving[one].name, moving[other].name, coefficients=coefficients or [0.0], name=name)
+    return Loop("coupling", body, _coupled(mj, i, other, moving), coefficients=coefficients or [0.0], name=name)
+
+
+def _coupled(mj: MjModel, i: int, which: int, moving: Sequence[Body]) -> str | dict[str, float]:
+    """The body on a joint, or those of a tendon with their coefficients."""
+    if _kind(mj, i) == "joint":
+        return moving[which].name
+    return {moving[j].name: coefficient for j, coefficient in fixed_tendon(mj, which).items()}
 
 
 def _sites(mj: MjModel, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End] | None:

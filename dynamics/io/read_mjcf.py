@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +16,7 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..multibody.algebra import spatial
+from ..multibody.bodies.joint_coordinates import coordinate_names, velocity_names
 from ..multibody.joints import TYPES
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
 from .contacts import untaken, with_contacts
@@ -29,7 +30,10 @@ from .smooth_forces import (
     actuators,
     disabled,
     first_output,
+    fixed_tendon,
+    input_names,
     inputs,
+    is_linear,
     joint_limits,
     mjcf_forces,
     modelled,
@@ -43,7 +47,7 @@ if TYPE_CHECKING:
 
 
 # Fields of MuJoCo's model that say so when they are not zero.
-_OF_A_TENDON = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "armature")
+_OF_A_TENDON = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "armature", "springyield")
 _OF_AN_ACTUATOR = ("actuator_armature", "actuator_damping", "actuator_dampingpoly")
 _NOT_LINEAR = ("jnt_stiffnesspoly", "jnt_springyield", "dof_dampingpoly")
 
@@ -61,9 +65,26 @@ def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
             ends.append((chain[-1].name, origin))
     gravity = mj.opt.gravity * (not disabled(mj, "GRAVITY"))
     moving = [body for body in bodies if body.joint.type.moves]
-    forces, loops = mjcf_forces(mj, moving, smooth), read_loops(mj, moving, ends)
-    mechanism = Mechanism(bodies, gravity, forces, left_out=left_out, loops=loops)
+    forces, loops = mjcf_forces(mj, moving, smooth, ends), read_loops(mj, moving, ends)
+    named = {name: 0.0 for force in forces for name in sorted(force.names)}
+    mechanism = Mechanism(
+        bodies, gravity, forces, named, left_out=left_out, loops=loops, starts=_starts(mj, moving, named)
+    )
     return mechanism if smooth.contacts is None else with_contacts(mechanism, smooth.contacts, *mjcf_balls(mj, ends))
+
+
+def _starts(mj: MjModel, moving: Sequence[Body], taken: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """{keyframe: its coordinates, velocities and inputs, by name}."""
+    names = [*[f"q.{name}" for name in coordinate_names(moving)], *[f"qd.{name}" for name in velocity_names(moving)]]
+    first = [inputs(mj, i)[0] for i in range(actuators(mj))]
+    ctrl = {name: first[i] for i, name in enumerate(input_names(mj)) if name in taken}
+    return {
+        mj.key(k).name or f"key {k}": dict(
+            zip(names, [*mj.key_qpos[k].tolist(), *mj.key_qvel[k].tolist()], strict=True)
+        )
+        | {name: float(mj.key_ctrl[k, at]) for name, at in ctrl.items()}
+        for k in range(mj.nkey)
+    }
 
 
 def compiled_mjcf(source: object, called: str) -> MjModel:
@@ -137,7 +158,8 @@ def _chain(
     inertia = spatial.cleaned(axes @ np.diag(moments) @ axes.T)
     center = position + spatial.cleaned(mj.body_ipos[body])
     last = chain[-1]
-    chain[-1] = Body(last.name, last.joint, last.parent, float(mass), center, inertia)
+    share = float(mj.body_gravcomp[body]) * (not disabled(mj, "GRAVITY"))
+    chain[-1] = Body(last.name, last.joint, last.parent, float(mass), center, inertia, share)
     return chain, position
 
 
@@ -175,15 +197,14 @@ def _not_modelled(mj: MjModel) -> list[str]:
     """Sentences on parts of the model's mechanism that a mechanism cannot have."""
     sprung = [] if disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
-    tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
+    pulling = [t for t in pulling if not is_linear(mj, t)]
     others = {
         f"springs of free joints, or of turned ball joints ({listed(_joint_names(mj, sprung))})": sprung,
-        f"tendons with a spring, damper or mass ({listed(tendons)})": pulling,
+        f"tendons with a spring, damper or mass ({_tendons(mj, pulling)})": pulling,
         "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
         f"joints with several dampings or armatures ({listed(_joint_names(mj, _uneven(mj)))})": _uneven(mj),
         "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
         "a fluid (density or viscosity)": mj.opt.density or mj.opt.viscosity,
-        "gravity compensation": _any(mj, "body_gravcomp") and not disabled(mj, "GRAVITY"),
         "flexible bodies": getattr(mj, "nflex", 0),
         "plugins": getattr(mj, "nplugin", 0),
     }
@@ -195,19 +216,29 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     limited = not disabled(mj, "CONSTRAINT", "LIMIT")
     limits = [j for j in sorted(_where(mj, "jnt_limited")) if smooth.limits is None or not single(mj, j)]
     touching = (np.any(mj.geom_contype) and np.any(mj.geom_conaffinity)) or mj.npair
+    pulling = {
+        what: [t for t in sorted(_where(mj, f"tendon_{field}")) if taken is None or not fixed_tendon(mj, t)]
+        for what, field, taken in (("limits", "limited", smooth.limits), ("loss", "frictionloss", smooth.friction))
+    }
     rubbing = not disabled(mj, "CONSTRAINT", "FRICTIONLOSS")
     rubbed = sorted(_where(mj, "dof_frictionloss"))
     names = _joint_names(mj, [int(mj.dof_jntid[i]) for i in rubbed])
     losses = [f"{name}: {mj.dof_frictionloss[i]:g}" for name, i in zip(names, rubbed, strict=True)]
+    mocap = [_body_names(mj)[i] for i in np.flatnonzero(mj.body_mocapid >= 0)]
+    weightless = _any(mj, "body_gravcomp") and not disabled(mj, "GRAVITY")
+    none_acts = not mj.nu or disabled(mj, "ACTUATION")
+    balancing = np.flatnonzero(mj.jnt_actgravcomp & (mj.jnt_actfrclimited | none_acts)).tolist() if weightless else []
     left = [i for i in range(actuators(mj)) if not (smooth.actuators and modelled(mj, i))]
     acting = {} if disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in left}
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
     others = {
         untaken(has_balls(mj)): touching and smooth.contacts is None and not disabled(mj, "CONSTRAINT", "CONTACT"),
         f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
-        "tendon limits": _any(mj, "tendon_limited") and limited,
+        f"tendon limits ({_tendons(mj, pulling['limits'])})": pulling["limits"] and limited,
         f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,
-        "friction loss of tendons": _any(mj, "tendon_frictionloss") and rubbing,
+        f"friction loss of tendons ({_tendons(mj, pulling['loss'])})": pulling["loss"] and rubbing,
+        f"motions of mocap bodies, which stand where the file has them ({listed(mocap)})": mocap,
+        f"ranges, or lack, of actuators that balance weight ({listed(_joint_names(mj, balancing))})": balancing,
         f"actuators ({len(acting) - len(servos)})": len(acting) > len(servos),
         f"actuators that act with no input ({listed(servos)})": servos,
     }
@@ -226,6 +257,10 @@ def _at_rest(mj: MjModel, i: int) -> str:
     terms += [f"input at {'least' if least > 0.0 else 'most'} {least:g}" for least in nearest if least]
     gear = mj.actuator_gear[first_output(mj, i), 0]
     return " ".join([*terms, *([f"times gear {gear:g}"] if terms and gear != 1.0 else [])])
+
+
+def _tendons(mj: MjModel, which: Sequence[int]) -> str:
+    return listed([mj.tendon(t).name or f"number {t}" for t in which])
 
 
 def _where(mj: MjModel, field: str) -> set[int]:

@@ -1,19 +1,24 @@
-"""Smooth forces of a robot file, taken on request: limits as springs, friction loss, actuators; and limits of MJCF."""
+"""Forces of a robot file: springs of tendons; on request limits as springs, friction, actuators; and limits of MJCF."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph._shared import real_array, real_number, require_flag
+import cgraph as cg
+from cgraph._shared import Array, real_array, real_number, require_flag
+from cgraph.extend import Builder, building
 
+from ..multibody.algebra import spatial
+from ..multibody.algebra.spatial import ZERO
 from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.bodies.limits import ANYTHING, Limits
-from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
+from ..multibody.forces.external_force import Force
+from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, JointSpring, Range
 from .contacts import Material, asked
 from .mujoco_module import mujoco
 
@@ -36,13 +41,14 @@ class Smooth:
     actuators: bool = False
     contacts: Mapping[str, float | str] | None = None
 
-    def limit(self, body: str, lower: float, upper: float) -> JointLimit:
-        """The limit of a joint."""
+    def limit(self, body: str | Mapping[str, float], lower: float, upper: float) -> JointLimit:
+        """The limit of a joint, or of several together."""
         assert self.limits is not None
         return JointLimit(body, lower, upper, *self.limits)
 
 
 NONE = Smooth()
+_NOT_LINEAR = ("stiffnesspoly", "dampingpoly", "armature", "springyield")
 
 
 def smooth(
@@ -74,22 +80,55 @@ def single(mj: MjModel, j: int) -> bool:
 
 
 def modelled(mj: MjModel, i: int) -> bool:
-    """Whether an actuator of MuJoCo's model is an `Actuator`: on a hinge or slide, affine, without memory.
+    """Whether an actuator of MuJoCo's model is taken: affine, without memory, on hinges, slides and tendons of these.
 
-    Of several on a joint whose whole force has a range, none is.
+    On a site or free joint it is without a share of the velocity. If the whole force on a joint has a range, only one
+    that acts on this joint alone, and is alone there, is taken.
     """
-    j = int(mj.actuator_trnid[i, 0])
-    if not (_on_joint(mj, i) and single(mj, j)):
-        return False
-    sharing = sum(_on_joint(mj, k) and mj.actuator_trnid[k, 0] == j for k in range(actuators(mj)))
+    joints, on_tendon = _joints(mj, i), _called("Trn", mj.actuator_trntype[i]) == "tendon"
+    ranged = [j for j in joints or range(mj.njnt) if mj.jnt_actfrclimited[j]]
+    others = [_joints(mj, k) or range(mj.njnt) for k in range(actuators(mj)) if k != i]
+    shared = on_tendon or not joints or any([j in other or mj.jnt_actgravcomp[j] for j in ranged for other in others])
     return (
         _called("Dyn", mj.actuator_dyntype[i]) == "none"
         and _called("Gain", mj.actuator_gaintype[i]) in ("fixed", "affine")
         and _called("Bias", mj.actuator_biastype[i]) in ("none", "affine")
-        and not (mj.jnt_actfrclimited[j] and sharing > 1)
-        and not (_delayed(mj, i) or mj.jnt_actgravcomp[j])
+        and not (ranged and shared)
+        and not (on_tendon and mj.tendon_actfrclimited[mj.actuator_trnid[i, 0]])
+        and not _delayed(mj, i)
         and len(inputs(mj, i)) == 1
+        and bool(joints or (_is_wrench(mj, i) and not any([numbers[2] for numbers in _gain_and_bias(mj, i)])))
     )
+
+
+def _joints(mj: MjModel, i: int) -> dict[int, float]:
+    """{hinge or slide: how far it moves the length that an actuator acts on}, empty for another transmission."""
+    at = int(mj.actuator_trnid[i, 0])
+    if _on_joint(mj, i):
+        return {at: 1.0} if single(mj, at) else {}
+    return fixed_tendon(mj, at) if _called("Trn", mj.actuator_trntype[i]) == "tendon" else {}
+
+
+def _is_wrench(mj: MjModel, i: int) -> bool:
+    """Whether an actuator pushes a site against the world, or a free body."""
+    at, reference = mj.actuator_trnid[i].tolist()
+    free = int(mujoco().mjtJoint.mjJNT_FREE)
+    on_site = _called("Trn", mj.actuator_trntype[i]) == "site" and reference < 0
+    return on_site or (_on_joint(mj, i) and int(mj.jnt_type[at]) == free)
+
+
+def fixed_tendon(mj: MjModel, tendon: int) -> dict[int, float]:
+    """{joint: coefficient} of a fixed tendon, empty for a spatial one."""
+    rows = range(mj.tendon_adr[tendon], mj.tendon_adr[tendon] + mj.tendon_num[tendon])
+    if any([int(mj.wrap_type[k]) != int(mujoco().mjtWrap.mjWRAP_JOINT) for k in rows]):
+        return {}
+    return {int(mj.wrap_objid[k]): float(mj.wrap_prm[k]) for k in rows}
+
+
+def is_linear(mj: MjModel, tendon: int) -> bool:
+    """Whether a tendon is fixed, without mass, and its spring and damper are linear."""
+    others = [np.asarray(getattr(mj, f"tendon_{what}", 0.0)) for what in _NOT_LINEAR]
+    return bool(fixed_tendon(mj, tendon)) and not any([each[tendon].any() for each in others if each.ndim])
 
 
 def actuators(mj: MjModel) -> int:
@@ -124,22 +163,53 @@ def _delayed(mj: MjModel, i: int) -> bool:
     return bool(delays.size and delays[i] > 0.0)
 
 
-def mjcf_forces(mj: MjModel, moving: Sequence[Body], taken: Smooth) -> list[JointForce]:
-    """The forces of MuJoCo's model that are taken.  moving: the bodies on its joints, in their order."""
-    forces: list[JointForce] = []
-    for j, body in enumerate(moving):
-        if taken.limits is not None and mj.jnt_limited[j] and single(mj, j) and not disabled(mj, "CONSTRAINT", "LIMIT"):
-            lower, upper = mj.jnt_range[j].tolist()
-            margin = float(mj.jnt_margin[j])
-            forces.append(taken.limit(body.name, lower + margin, upper - margin))
-        loss = float(mj.dof_frictionloss[mj.jnt_dofadr[j]])
-        if taken.friction is not None and loss and not disabled(mj, "CONSTRAINT", "FRICTIONLOSS"):
-            forces.append(JointFriction(body.name, loss, taken.friction))
+def mjcf_forces(
+    mj: MjModel, moving: Sequence[Body], taken: Smooth, ends: Sequence[tuple[str, Array]]
+) -> list[JointForce | Force]:
+    """The forces of MuJoCo's model that are taken.
+
+    moving: the bodies on its joints, in their order.  ends: for each of its bodies ours, and the origin of its frame in
+    that of ours.
+    """
+    forces: list[JointForce | Force] = []
+    tendons = [{moving[j].name: share for j, share in fixed_tendon(mj, t).items()} for t in range(mj.ntendon)]
+    for t, shares in enumerate(tendons):
+        stiffness = float(mj.tendon_stiffness[t]) * (not disabled(mj, "SPRING"))
+        damping = float(mj.tendon_damping[t]) * (not disabled(mj, "DAMPER"))
+        if is_linear(mj, t) and (stiffness or damping):
+            forces.append(JointSpring(shares, stiffness, damping, *mj.tendon_lengthspring[t].tolist()))
+    losses = [*mj.dof_frictionloss[mj.jnt_dofadr].tolist(), *mj.tendon_frictionloss.tolist()]
+    ways: list[Any] = [*[body.name for body in moving], *tendons]
+    for k, of in enumerate(ways):
+        what, i = ("jnt", k) if k < mj.njnt else ("tendon", k - mj.njnt)
+        limited = getattr(mj, f"{what}_limited")[i] and not disabled(mj, "CONSTRAINT", "LIMIT")
+        if taken.limits is not None and limited and of and (what == "tendon" or single(mj, i)):
+            (lower, upper), margin = getattr(mj, f"{what}_range")[i].tolist(), float(getattr(mj, f"{what}_margin")[i])
+            forces.append(taken.limit(of, lower + margin, upper - margin))
+        if taken.friction is not None and losses[k] and of and not disabled(mj, "CONSTRAINT", "FRICTIONLOSS"):
+            forces.append(JointFriction(of, losses[k], taken.friction))
     if taken.actuators and not disabled(mj, "ACTUATION"):
-        names = _input_names(mj)
-        acting = [i for i in range(actuators(mj)) if modelled(mj, i) and not _switched_off(mj, i)]
-        forces += [_actuator(mj, i, names[i], moving) for i in acting]
+        names = input_names(mj)
+        for i in [i for i in range(actuators(mj)) if modelled(mj, i) and not _switched_off(mj, i)]:
+            actuator = _actuator(mj, i, names[i], moving)
+            forces += [actuator] if actuator.body else _pushes(mj, i, actuator, ends)
     return forces
+
+
+def _pushes(mj: MjModel, i: int, actuator: Actuator, ends: Sequence[tuple[str, Array]]) -> list[Force]:
+    """The forces of an actuator on a site or free joint: its gear is a wrench in the axes of the site."""
+    at = int(mj.actuator_trnid[i, 0])
+    with building(Builder()):
+        (force,) = actuator.along([ZERO], [ZERO], {actuator.input: cg.variable(actuator.input)})
+        gear, kind = np.reshape(mj.actuator_gear[first_output(mj, i)], (2, 3)), _called("Trn", mj.actuator_trntype[i])
+        if kind == "site":
+            gear = gear @ spatial.from_quaternion(mj.site_quat[at]).T
+        push, turn = ([float(share) * force for share in row] for row in gear)
+    if kind == "site":
+        body, origin = ends[mj.site_bodyid[at]]
+        return [Force(body, push, origin + mj.site_pos[at], "body", turn)]
+    body = ends[mj.jnt_bodyid[at]][0]
+    return [Force(body, push), Force(body, torque=turn, frame="body" if kind == "joint" else "world")]
 
 
 def _switched_off(mj: MjModel, i: int) -> bool:
@@ -148,7 +218,7 @@ def _switched_off(mj: MjModel, i: int) -> bool:
     return 0 <= group < 31 and bool(int(mj.opt.disableactuator) >> group & 1)
 
 
-def _input_names(mj: MjModel) -> list[str]:
+def input_names(mj: MjModel) -> list[str]:
     """Names of the parameters that control the actuators, all different."""
     names: list[str] = []
     for i in range(actuators(mj)):
@@ -159,22 +229,29 @@ def _input_names(mj: MjModel) -> list[str]:
     return names
 
 
-def _actuator(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Actuator:
-    j, ctrl = int(mj.actuator_trnid[i, 0]), inputs(mj, i)[0]
+def _gain_and_bias(mj: MjModel, i: int) -> tuple[list[float], list[float]]:
+    """Of 1, length and velocity."""
     gain, bias = mj.actuator_gainprm[i, :3].tolist(), mj.actuator_biasprm[i, :3].tolist()
     if _called("Gain", mj.actuator_gaintype[i]) == "fixed":
         gain[1:] = 0.0, 0.0
     if _called("Bias", mj.actuator_biastype[i]) == "none":
         bias = [0.0, 0.0, 0.0]
+    return gain, bias
+
+
+def _actuator(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Actuator:
+    """The actuator, on the joints that it acts on; on none of those, with a gear of 1."""
+    joints = _joints(mj, i)
+    shares = {moving[j].name: coefficient for j, coefficient in joints.items()}
+    on_joint = _on_joint(mj, i) and bool(joints)
     return Actuator(
-        moving[j].name,
+        next(iter(shares)) if on_joint else shares,
         name,
-        float(mj.actuator_gear[first_output(mj, i), 0]),
-        gain,
-        bias,
-        None if disabled(mj, "CLAMPCTRL") else _range(mj, "actuator_ctrl", ctrl),
+        float(mj.actuator_gear[first_output(mj, i), 0]) if joints else 1.0,
+        *_gain_and_bias(mj, i),
+        None if disabled(mj, "CLAMPCTRL") else _range(mj, "actuator_ctrl", inputs(mj, i)[0]),
         _range(mj, "actuator_force", i),
-        _range(mj, "jnt_actfrc", j),
+        _range(mj, "jnt_actfrc", next(iter(joints))) if on_joint else None,
     )
 
 

@@ -103,6 +103,7 @@ def mujoco_spec(mechanism: Mechanism, timestep: float) -> MjSpec:
             iquat=spatial.to_quaternion(moments[body.name][1]),
             inertia=values,
             explicitinertial=True,
+            gravcomp=float(body.gravity_compensation),
         )
         if body.joint.type.moves:
             made[body.name].add_joint(**_joint(body))
@@ -186,8 +187,9 @@ def _add_equality(spec: MjSpec, made: dict[str, Any], mechanism: Mechanism, loop
         kind, held, data = _OF_SITES[loop.kind], module.mjtObj.mjOBJ_SITE, [0.0] * 10 + [1.0]  # torquescale of a weld
         names = [f"{loop.label} at", f"{loop.label} to"]
         turn = loop.orientation if loop.kind == "weld" else np.eye(3)
-        made[loop.body].add_site(name=names[0], **_place(loop.at, np.eye(3)))
-        made[loop.to].add_site(name=names[1], **_place(loop.to_at, turn))
+        body, to = loop.bodies
+        made[body].add_site(name=names[0], **_place(loop.at, np.eye(3)))
+        made[to].add_site(name=names[1], **_place(loop.to_at, turn))
     else:
         raise MechanismError(f"MJCF has no loop of the kind {loop.kind!r}, as is {loop.label!r}")
     equality = spec.add_equality(name=loop.label, type=getattr(module.mjtEq, f"mjEQ_{kind}"), objtype=held)
@@ -198,7 +200,9 @@ def _add_equality(spec: MjSpec, made: dict[str, Any], mechanism: Mechanism, loop
 def _coupled(mechanism: Mechanism, loop: Loop) -> list[str]:
     """Names of the joints of a coupling."""
     parts = {body.name: body for body in mechanism.parts}
-    bodies = [parts[name] for name in (loop.body, loop.to) if name != WORLD]
+    if len(loop.bodies) > 2:
+        raise MechanismError(f"MJCF couples two joints, and loop {loop.label!r} {len(loop.bodies)}")
+    bodies = [parts[name] for name in loop.bodies if name != WORLD]
     for body in bodies:
         if not body.joint.type.moves:
             raise MechanismError(

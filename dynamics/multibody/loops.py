@@ -47,8 +47,9 @@ class Loop:
         body's joint is a polynomial of that of the other's, as in gears (URDF `mimic`, MJCF `equality/joint`).
         "rolling": a wheel with a thin rim, about `axis` through `at`, of radius `length`, rolls without slip on the
         plane of the other through `to_at` with the normal `to_axis` (nonholonomic).
-    body, to : str
-        Names of the bodies; `to` may be "world", except in a coupling without a second joint.
+    body, to : str or mapping of str to float
+        Names of the bodies; `to` may be "world", except in a coupling without a second joint. Of a "coupling" either
+        may be {body: c}, which stands for the sum of c q over these joints, as a fixed tendon of MJCF does.
     at, to_at : array_like, (3,)
         The points, each in its body's frame [m].
     axis, to_axis : array_like, (3,)
@@ -92,8 +93,8 @@ class Loop:
     """
 
     kind: str
-    body: str
-    to: str = WORLD
+    body: str | Mapping[str, float]
+    to: str | Mapping[str, float] = WORLD
     at: ArrayLike = (0.0, 0.0, 0.0)
     to_at: ArrayLike = (0.0, 0.0, 0.0)
     axis: ArrayLike = (0.0, 0.0, 1.0)
@@ -111,7 +112,13 @@ class Loop:
     @property
     def label(self) -> str:
         """Name of the loop, with which those of its rows begin."""
-        return self.name or f"{self.body} to {self.to}"
+        ends = [", ".join([f"{name}" for name, _ in _shares(end)]) for end in (self.body, self.to)]
+        return self.name or " to ".join(ends)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """Names of all its bodies, "world" among them."""
+        return tuple([name for name, _ in [*_shares(self.body), *_shares(self.to)]])
 
     @property
     def rows(self) -> tuple[str, ...]:
@@ -122,6 +129,10 @@ class Loop:
     def velocity_rows(self) -> tuple[str, ...]:
         """Names of its rows of velocities alone."""
         return tuple([f"{self.label} {row}" for row in SLIPS]) if self.kind == "rolling" else ()
+
+
+def _shares(end: str | Mapping[str, float]) -> list[tuple[str, float]]:
+    return [*end.items()] if isinstance(end, Mapping) else [(end, 1.0)]
 
 
 def check_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> None:
@@ -150,7 +161,7 @@ def position_rows(
         if loop.kind == "coupling":
             phi = [_coupling_row(loop, coordinates)]
         else:
-            ends = [carriers[name] for name in (loop.body, loop.to)]
+            ends = [carriers[name] for name in loop.bodies]
             phi = _loop_rows(loop, *kinematic_chains(ends, moving, states))
         rows |= dict(zip(loop.rows, phi, strict=True))
     return rows
@@ -176,13 +187,15 @@ def velocity_rows(loops: Sequence[Loop], chain: Callable[[str], KinematicChain])
     rows: dict[str, Node] = {}
     for loop in loops:
         if loop.velocity_rows:
-            rows |= dict(zip(loop.velocity_rows, _slip_rows(loop, chain(loop.body), chain(loop.to)), strict=True))
+            rows |= dict(zip(loop.velocity_rows, _slip_rows(loop, *map(chain, loop.bodies)), strict=True))
     return rows
 
 
 def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     """Raises MechanismError unless the loop's bodies are there and its numbers are what its kind needs."""
-    for name in (loop.body, loop.to):
+    if loop.kind != "coupling" and any([isinstance(end, Mapping) for end in (loop.body, loop.to)]):
+        raise MechanismError(f"loop {loop.label!r}: only a coupling has several bodies at one end")
+    for name in loop.bodies:
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
             raise MechanismError(f"there is a loop on the unknown body {name!r:.80}")
     checked_name("a loop", loop.label if isinstance(loop.name, str) else loop.name)
@@ -208,7 +221,9 @@ def _check_coupling(loop: Loop, where: str, bodies: Mapping[str, Body]) -> None:
     listed = isinstance(given, Sequence | np.ndarray) and not isinstance(given, str)
     if not (listed and len(given) and all([is_finite(each) for each in given])):
         raise MechanismError(f"{where}: coefficients must be finite numbers, at least one, got {given!r:.60}")
-    for name in (loop.body, loop.to):
+    for name, share in [*_shares(loop.body), *_shares(loop.to)]:
+        if not is_finite(share):
+            raise MechanismError(f"{where}: the coefficient of {name!r} must be finite, got {share!r:.60}")
         if name == WORLD:
             fits = len(given) == 1  # a constant
         else:
@@ -276,10 +291,14 @@ def _slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Nod
 def _coupling_row(loop: Loop, coordinates: Mapping[str, Node]) -> Node:
     """q - (c0 + c1 q_to + ..) of a coupling; a locked joint is a number."""
     with building(Builder()), cg.tag(loop.label):
+        own, other = (
+            sum([float(share) * coordinates[name] for name, share in _shares(end) if name != WORLD], ZERO)
+            for end in (loop.body, loop.to)
+        )
         value = ZERO
         for coefficient in reversed(loop.coefficients[1:]):
-            value = (value + float(coefficient)) * coordinates[loop.to]
-        return coordinates[loop.body] - (value + float(loop.coefficients[0]))
+            value = (value + float(coefficient)) * other
+        return own - (value + float(loop.coefficients[0]))
 
 
 def _axes(loop: Loop) -> list[Array]:

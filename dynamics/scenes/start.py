@@ -7,15 +7,16 @@ from typing import TypeVar
 import numpy as np
 
 from cgraph import Graph
-from cgraph._shared import or_nearest, real_array, real_number
+from cgraph._shared import Array, or_nearest, real_array, real_number
 
 from ..equations.state_equation import state_equation
 from ..equations.states.consistent_state import nearest_state
 from ..multibody.bodies.joint_coordinates import display_units
-from .scenes import Scene
+from ..systems.model import Model
+from .scenes import Scene, of_model
 
 Known = TypeVar("Known", bound=Scene)
-Start = Mapping[str, float] | Sequence[float]
+Start = Mapping[str, float] | Sequence[float] | str
 AWAY, IN_ALL = 0.5, np.pi  # rad, and the unit of any other coordinate: how far from a place of rest a motion starts
 SHOWN = 4  # values of a start that a line of text names
 _ROUNDING = 1e-9  # of the largest acceleration nearby: less is what is left of a difference
@@ -25,16 +26,28 @@ def with_start(scene: Known, start: Start) -> Known:
     """The scene from another start.
 
     start: {name: value} of what differs from the scene's own, as "q0", "q.knee", "qd.knee" or a coordinate's name; or
-    all numbers of q and then qd. Raises ValueError for a name that is none, or twice, or another number of numbers.
+    all numbers of q and then qd; or the name or the number of one of the model's `starts`, with its parameters.
+    Raises ValueError for a name that is none, or twice, or another number of numbers.
     """
+    named = scene.mechanism.starts if scene.mechanism else {}
+    if named and not isinstance(start, str | Mapping) and real_array("start", start).shape == (1,):
+        start = {float(k): name for k, name in enumerate(named)}.get(start[0], f"{start[0]:g}")
+    if isinstance(start, str):
+        if start not in named:
+            form = "a start is such as q0=0.5,qd0=1, or all numbers of q and qd"
+            raise ValueError(f"there is no start {start!r:.80}; {or_nearest(start, [*named]) if named else form}")
+        given = {name: value for name, value in named[start].items() if name in scene.parameters}
+        if given and scene.mechanism:
+            scene = replace(scene, model=replace(scene.mechanism, parameters={**scene.mechanism.parameters, **given}))
+        start = {name: value for name, value in named[start].items() if name in _meant(scene)}
     states = [*scene.coordinates, *(() if scene.ode else scene.velocities)]
     values = [*scene.q, *scene.qd]
     if not isinstance(start, Mapping):
-        given = real_array("start", start)
-        if given.shape != (len(values),):
+        numbers = real_array("start", start)
+        if numbers.shape != (len(values),):
             shown = ", ".join(_names(scene)[:12]) + (", .." if len(states) > 12 else "")
-            raise ValueError(f"the start needs {len(values)} numbers ({shown}), got {given.size}")
-        values = given.tolist()
+            raise ValueError(f"the start needs {len(values)} numbers ({shown}), got {numbers.size}")
+        values = numbers.tolist()
     else:
         meant = _meant(scene)
         taken: dict[int, str] = {}
@@ -47,6 +60,43 @@ def with_start(scene: Known, start: Start) -> Known:
             values[meant[name]] = real_number(f"start: {name}", value)
     nq = len(scene.q)
     return replace(scene, q=tuple(values[:nq]), qd=tuple(values[nq:]))
+
+
+def start(model: Model, key: str | int) -> tuple[Array, Array]:
+    """A state by its name: one of the model's `starts`, which are the keyframes of a MJCF file.
+
+    Parameters
+    ----------
+    model : Model
+        A `Mechanism` or a scene of one.
+    key : str or int
+        The name, or the place among all; one without a name is "key 0" at place 0.
+
+    Returns
+    -------
+    q, qd : ndarray
+        (nq,) [rad or m] and (n,) [rad/s or m/s], as `simulate` takes them; what the start does not name is at rest.
+        Inputs of actuators, which a start has too, are in `model.starts[key]`.
+
+    Raises
+    ------
+    ValueError
+        For a start that the model has not.
+    TypeError
+        For what is no name and no number.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0], [1.0])
+    >>> arm = dyn.Mechanism(arm.bodies, arm.gravity, starts={"home": {"q.joint 1": 0.3}})
+    >>> dyn.start(arm, "home")
+    (array([0.3]), array([0.]))
+    """
+    scene = of_model(model)
+    numbered = not isinstance(key, str) and scene.mechanism is not None and bool(scene.mechanism.starts)
+    scene = with_start(scene, [real_number("key", key)] if numbered else str(key))
+    return np.array(scene.q), np.array(scene.qd)
 
 
 def moving_start(scene: Scene) -> Scene:

@@ -63,8 +63,8 @@ def certify(
         Standard deviation of qd, qdd and tau, which are normal; with constraints, before qd is moved onto them.
     twin : str, path or MjModel, optional
         What MuJoCo compares with in place of the model's own translation: a path or text of MJCF or URDF, with the
-        joints of the same names, or in the same order. Its contacts, joint limits, friction loss and actuators are left
-        out.
+        joints of the same names, or in the same order. Its contacts, limits and friction loss are left out, and those
+        of its actuators that the model has not; the others have random inputs.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def certify(
     residuals, left_out = _among_graphs(_Checks(system, at, t, rng))
     for name, peer in agreement.peers(model, theirs):
         try:
-            residuals.append(agreement.residual(name, peer(), model, at))
+            residuals.append(agreement.residual(name, peer(), at))
         except UnavailableError as error:
             left_out.append(str(error) if str(error).startswith(name) else f"{name}: {error}")
     if len(system.constraints):

@@ -10,6 +10,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph._shared import Array
 
@@ -19,9 +20,13 @@ from ..equations.states.evaluate import evaluate
 from ..io.load import compiled
 from ..io.mujoco_module import mujoco
 from ..io.mujoco_twin import MujocoTwin, joint_order
+from ..io.smooth_forces import input_names, inputs
 from ..multibody.bodies.body import MechanismError
 from ..multibody.changes.switched_effects import without_effect
+from ..multibody.forces.external_force import Force
+from ..multibody.forces.joint_force import Actuator, JointSpring
 from ..multibody.trees.mechanism import Mechanism, as_mechanism
+from ..multibody.trees.structure import changed
 from ..systems.model import Model
 from .pinocchio_bodies import PinocchioBodies, constrained_accelerations
 from .residual import PEERS, PROXIMAL, Residual, UnavailableError
@@ -126,19 +131,28 @@ class Translation:
 
 
 class Original:
-    """MuJoCo on a model of its own: of a file, say.  q_order, order: of our coordinates and velocities in its."""
+    """MuJoCo on a model of its own: of a file, say.
 
-    def __init__(self, mj: MjModel, q_order: Sequence[int], order: Sequence[int]) -> None:
-        self.mj, self.q_order, self.order = mj, list(q_order), list(order)
+    q_order, order: of our coordinates and velocities in its.  mechanism: what is compared.  ctrl: inputs, (nu,).
+    """
+
+    def __init__(
+        self, mj: MjModel, orders: tuple[Sequence[int], Sequence[int]], mechanism: Mechanism, ctrl: ArrayLike = ()
+    ) -> None:
+        self.mj, self.orders, self.mechanism, self.ctrl = mj, orders, mechanism, ctrl
+        self.q_order, self.order = map(list, orders)
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
         module, data = mujoco(), mujoco().MjData(self.mj)
+        data.ctrl[:] = self.ctrl if self.mj.nu else 0.0
         rows = []
         for q, qd, qdd in zip(at["q"], at["qd"], at["qdd"], strict=True):
             data.qpos[self.q_order], data.qvel[self.order], data.qacc[self.order] = q, qd, qdd
             module.mj_inverse(self.mj, data)
-            rows.append(data.qfrc_inverse[self.order])
+            for stage in (module.mj_fwdPosition, module.mj_fwdVelocity, module.mj_fwdActuation):
+                stage(self.mj, data)
+            rows.append((data.qfrc_inverse - data.qfrc_actuator)[self.order])
         return np.array(rows)
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Original:
@@ -147,13 +161,13 @@ class Original:
         for name in terms:
             TERMS[name].theirs(mj, sizes)
         mujoco().mj_setConst(mj, mujoco().MjData(mj))
-        return Original(mj, self.q_order, self.order)
+        return Original(mj, self.orders, self.mechanism, self.ctrl)
 
 
 def twin_of(mechanism: Mechanism) -> Original:
     """MuJoCo on the model as `to_mjcf` writes it."""
     twin = MujocoTwin(mechanism)
-    return Original(twin.model, *joint_order(twin.model, mechanism))
+    return Original(twin.model, joint_order(twin.model, mechanism), mechanism)
 
 
 def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Translation | Original]]]:
@@ -165,9 +179,9 @@ def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Cal
     yield "Pinocchio", lambda: _translated(PinocchioBodies, model)
 
 
-def residual(name: str, peer: Translation | Original, model: Model, at: Mapping[str, Array]) -> Residual:
+def residual(name: str, peer: Translation | Original, at: Mapping[str, Array]) -> Residual:
     """Difference of the inverse dynamics of a peer from ours, with the terms that explain it where it is too large."""
-    bodies = bare(model)
+    bodies = peer.mechanism
     value = disagreement(bodies, peer, at)
     note = "" if value <= PEERS.value else explanation(bodies, peer, at)
     return Residual(f"inverse dynamics = {name}'s", value, PEERS, note)
@@ -211,14 +225,14 @@ def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], l
     return [Residual("forward dynamics with loops = Pinocchio's constraintDynamics", value, PROXIMAL)], said
 
 
-def bare(model: Model) -> Mechanism:
+def bare(model: Model, kept: Sequence[type] = ()) -> Mechanism:
     """The tree of `_without_forces`, as its loops are no part of inverse dynamics."""
-    bodies = _without_forces(model)
+    bodies = _without_forces(model, kept)
     return replace(bodies, loops=()) if bodies.loops else bodies
 
 
-def _without_forces(model: Model) -> Mechanism:
-    """The mechanism of a model, without forces on its bodies, which the peers do not have, and parameters as numbers.
+def _without_forces(model: Model, kept: Sequence[type] = ()) -> Mechanism:
+    """The mechanism of a model, with parameters as numbers, and of forces, which peers do not have, those `kept`.
 
     Raises UnavailableError for another model.
     """
@@ -226,7 +240,8 @@ def _without_forces(model: Model) -> Mechanism:
     if bodies is None:
         raise UnavailableError("takes rigid bodies, not a Lagrangian")
     bodies = bodies.bind()
-    return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
+    forces = [force for force in bodies.forces if isinstance(force, tuple(kept))]
+    return changed(bodies, forces=forces) if bodies.forces else bodies
 
 
 def _translated(make: Callable[[Mechanism], Original | PinocchioBodies], model: Model) -> Translation:
@@ -243,17 +258,25 @@ def original(twin: Source, model: Model) -> Original:
     of rigid bodies.
     """
     module, theirs = mujoco(), copy.copy(compiled(twin))
+    ctrl, called = np.random.default_rng(0).normal(size=theirs.nu), input_names(theirs)
+    at = [inputs(theirs, i)[0] for i in range(len(called))]
+    given = as_mechanism(model)
+    known = given.parameter_values if given else {}
+    taken = {name: float(ctrl[k]) for name, k in zip(called, at, strict=True) if name in known}
     try:
-        bodies = bare(model)
+        bodies = bare(given.bind(taken) if given else model, (Actuator, JointSpring, Force))
     except UnavailableError as error:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
+    for i in [i for i, name in enumerate(called) if name not in taken]:
+        theirs.actuator_gaintype[i] = theirs.actuator_biastype[i] = theirs.actuator_dyntype[i] = 0
+        theirs.actuator_gainprm[i], theirs.actuator_biasprm[i] = 0.0, 0.0
     loops = getattr(as_mechanism(model), "loops", ())
     nq, n = len(bodies.coordinates), len(bodies.velocities)
     if (theirs.nq, theirs.nv) != (nq, n):
         raise ValueError(f"the twin has {theirs.nv} degrees of freedom, the model {n}")
-    for unused in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", *["EQUALITY"] * bool(loops)):
+    for unused in ("CONTACT", "LIMIT", "FRICTIONLOSS", *["EQUALITY"] * bool(loops)):
         theirs.opt.disableflags |= getattr(module.mjtDisableBit, f"mjDSBL_{unused}")
     names = {theirs.joint(i).name for i in range(theirs.njnt)}
     if names != {body.coordinate for body in bodies.moving}:
-        return Original(theirs, range(nq), range(n))
-    return Original(theirs, *joint_order(theirs, bodies))
+        return Original(theirs, (range(nq), range(n)), bodies, ctrl)
+    return Original(theirs, joint_order(theirs, bodies), bodies, ctrl)

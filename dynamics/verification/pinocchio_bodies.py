@@ -29,6 +29,8 @@ class PinocchioBodies:
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
+        if balanced := [link.name for link in mechanism.parts if link.gravity_compensation]:
+            raise UnavailableError(f"no gravity compensation, as body {balanced[0]!r} has it")
         self.pinocchio, self.of = pinocchio(), PinocchioModel(mechanism)
         self.model, self.data = self.of.model, self.of.model.createData()
         self.nq, self.n = len(mechanism.coordinates), len(mechanism.velocities)
@@ -101,7 +103,8 @@ def constrained_accelerations(mechanism: Mechanism, q: Array, qd: Array, tau: Ar
     pin, model, data = peer.pinocchio, peer.model, peer.data
     models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
     for loop in mechanism.loops:
-        ends = [*_frame(peer, mechanism, loop.body, loop.at), *_frame(peer, mechanism, loop.to, loop.to_at, loop)]
+        body, to = loop.bodies
+        ends = [*_frame(peer, mechanism, body, loop.at), *_frame(peer, mechanism, to, loop.to_at, loop)]
         models.append(pin.RigidConstraintModel(getattr(pin.ContactType, _KINDS[loop.kind]), model, *ends, pin.LOCAL))
         datas.append(models[-1].createData())
     pin.initConstraintDynamics(model, data, models, datas)

@@ -298,19 +298,22 @@ def takes_a_start(command: argparse.ArgumentParser) -> None:
         "--start",
         type=start,
         metavar="A=1,B=2",
-        help="in place of the scene's start: what differs from it, by names such as q0, qd.knee or knee, or all "
-        "numbers of q and qd; without it, a scene that would only rest starts half a radian away",
+        help="in place of the scene's start: what differs from it, by names such as q0, qd.knee or knee, all "
+        "numbers of q and qd, or a keyframe of the file by name or number; without it, a scene that would only rest "
+        "starts half a radian away",
     )
 
 
 def start(text: str) -> library.Start:
-    """`q0=0.3,qd.knee=1` as numbers by name, or `0.3,0,0,1` as all of them, for argparse."""
+    """`q0=0.3,qd.knee=1` as numbers by name, `0.3,0,0,1` as all of them, or a keyframe's name, for argparse."""
     if "=" in text:
         return point(text)
     try:
         return [number(each) for each in text.split(",")]
     except argparse.ArgumentTypeError as error:
-        said = f"{error}; a start is such as q0=0.5,qd0=1, or all numbers of q and qd"
+        if "," not in text:
+            return text
+        said = f"{error}; a start is such as q0=0.5,qd0=1, or all numbers of q and qd, or a keyframe's name"
         raise argparse.ArgumentTypeError(said) from None
 
 

@@ -144,7 +144,7 @@ class Joint:
 class Body:
     """A rigid body and the joint that carries it.
 
-    In place of a number of mass, center and inertia may stand a parameter: its name, or a node over `cg.variable`s.
+    In place of a number of these but the joint's may stand a parameter: its name, or a node over `cg.variable`s.
     Its value is in the mechanism's `parameters`, and it is an input of the graphs.
 
     Parameters
@@ -161,6 +161,9 @@ class Body:
         Center of mass in the body's frame [m].
     inertia : array_like, (3, 3) or (3,)
         About the center of mass, in the body's axes, whole or its diagonal [kg m^2].
+    gravity_compensation : float
+        The share of its weight that something balances, at its center of mass: 1 leaves it weightless (`gravcomp` of
+        MJCF). Energies are with it.
 
     Examples
     --------
@@ -179,6 +182,7 @@ class Body:
     mass: Quantity = 0.0
     center: Quantities = (0.0, 0.0, 0.0)
     inertia: Quantities = (0.0, 0.0, 0.0)
+    gravity_compensation: Quantity = 0.0
 
     @property
     def coordinate(self) -> str:
@@ -255,7 +259,9 @@ def checked(body: Body) -> Body:
     with np.errstate(over="ignore"):
         beside = 0.0 if isinstance(mass, Node) or center.dtype == object else mass * float(center @ center)
     inertia = _inertia(f"{where}: inertia", body.inertia, beside)
-    return replace(body, mass=mass, center=center, inertia=inertia, joint=_checked_joint(where, joint))
+    share = BODY_QUANTITIES["gravity_compensation"](f"{where}: gravity_compensation", body.gravity_compensation)
+    joint = _checked_joint(where, joint)
+    return replace(body, mass=mass, center=center, inertia=inertia, gravity_compensation=share, joint=joint)
 
 
 def unit_axis(what: str, value: object) -> Array:
@@ -351,6 +357,7 @@ BODY_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
     "mass": partial(quantity, unit=" kg"),
     "center": quantities,
     "inertia": _inertia,
+    "gravity_compensation": partial(quantity, minimum=-math.inf),
 }
 JOINT_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
     "position": quantities,

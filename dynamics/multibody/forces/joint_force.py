@@ -1,4 +1,4 @@
-"""Joint forces: limits as springs, dry friction, actuators; and all forces along the velocities of a mechanism."""
+"""Joint forces: springs, limits, dry friction, actuators; and all forces along the velocities of a mechanism."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,14 +32,15 @@ Range = tuple[float, float]
 class JointForce(ABC):
     """A force along the freedoms of a joint, smooth or with kinks, one of the `forces` of a mechanism.
 
-    On a joint that is locked it has no effect. `JointLimit`, `JointFriction` and `Actuator` are such forces; one of
-    your own says its force in `along` and what it refuses in `check`. Parameters that `along` reads are named by the
-    property `components`, and are 0 where the mechanism's `parameters` say nothing else.
+    On a joint that is locked it has no effect. `JointSpring`, `JointLimit`, `JointFriction` and `Actuator` are such;
+    one of your own says its force in `along` and what it refuses in `check`. Parameters that `along` reads are named by
+    the property `components`, and are 0 where the mechanism's `parameters` say nothing else.
 
     Parameters
     ----------
-    body : str
-        The name of the body on the joint.
+    body : str or mapping of str to float
+        The name of the body on the joint. Or {body: c} of several joints of one coordinate each, which it acts on as
+        MuJoCo's fixed tendon does: its coordinate is the sum of c q, and every joint gets c times the force.
 
     Examples
     --------
@@ -55,7 +57,12 @@ class JointForce(ABC):
     {'qdd0': -0.5}
     """
 
-    body: str
+    body: str | Mapping[str, float]
+
+    @property
+    def shares(self) -> Mapping[str, float]:
+        """{body: how far its joint moves the coordinate of the force}."""
+        return {self.body: 1.0} if isinstance(self.body, str) else self.body
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -75,7 +82,8 @@ class JointForce(ABC):
     @property
     def label(self) -> str:
         """What errors call it."""
-        return f"{type(self).__name__} on body {self.body!r}"
+        bodies = " and ".join(map(repr, self.body)) if isinstance(self.body, Mapping) else repr(self.body)
+        return f"{type(self).__name__} on body {bodies}"
 
     @abstractmethod
     def check(self, body: Body) -> None:
@@ -108,8 +116,8 @@ class JointLimit(JointForce):
 
     Parameters
     ----------
-    body : str
-        The body on the joint, a hinge or slide.
+    body : str or mapping of str to float
+        The body on the joint, a hinge or slide, or several, see `JointForce`.
     lower, upper : float
         The range of its coordinate [rad or m]; infinite where there is no limit.
     stiffness : float
@@ -135,9 +143,7 @@ class JointLimit(JointForce):
         """Raises MechanismError for a joint of several coordinates, an empty range, and numbers out of range."""
         self._require_axis(body)
         if not (real_number("lower", self.lower) < real_number("upper", self.upper)):
-            raise MechanismError(
-                f"JointLimit on body {self.body!r}: lower must be below upper, got {self.lower!r} and {self.upper!r}"
-            )
+            raise MechanismError(f"{self.label}: lower must be below upper, got {self.lower!r} and {self.upper!r}")
         self._require("stiffness", self.stiffness, 0.0)
         self._require("damping", self.damping, 0.0)
 
@@ -155,6 +161,47 @@ class JointLimit(JointForce):
 
 
 @dataclass(frozen=True, eq=False)
+class JointSpring(JointForce):
+    """A spring and a damper of joints: -k (q - r) - d qd, r the nearest of lower <= r <= upper to q; no energy is kept.
+
+    Parameters
+    ----------
+    body : str or mapping of str to float
+        See `JointForce`; the joints are hinges and slides.
+    stiffness, damping : float
+        k and d, at least 0 [N m/rad or N/m, N m s or N s/m].
+    lower, upper : float
+        Where it pulls nowhere [rad or m].
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> fingers = [dyn.Body(name, dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0) for name in ("left", "right")]
+    >>> hand = dyn.Mechanism(fingers, forces=[dyn.JointSpring({"left": 1.0, "right": -1.0}, stiffness=8.0)])
+    >>> dyn.forward_dynamics(hand).evaluate({"q0": 0.5, "q1": 0.0, "qd0": 0.0, "qd1": 0.0, "tau0": 0.0, "tau1": 0.0})
+    {'qdd0': -2.0, 'qdd1': 2.0}
+    """
+
+    stiffness: float
+    damping: float = 0.0
+    lower: float = 0.0
+    upper: float = 0.0
+
+    def check(self, body: Body) -> None:
+        """Raises MechanismError for a joint of several coordinates, and for numbers out of range."""
+        self._require_axis(body)
+        self._require("stiffness", self.stiffness, 0.0)
+        self._require("damping", self.damping, 0.0)
+        self._require("lower", self.lower)
+        self._require("upper", self.upper, self.lower)
+
+    def along(self, q: Sequence[Node], qd: Sequence[Node], parameters: Mapping[str, Node]) -> list[Node]:
+        """The force on the coordinate."""
+        rest = cg.constant(self.lower) if self.lower == self.upper else _within(q[0], (self.lower, self.upper))
+        return [-(self.stiffness * (q[0] - rest) + self.damping * qd[0])]
+
+
+@dataclass(frozen=True, eq=False)
 class JointFriction(JointForce):
     """Dry friction of a joint: -loss sign(qd), which sticks, or -loss tanh(qd / velocity), which creeps.
 
@@ -164,8 +211,8 @@ class JointFriction(JointForce):
 
     Parameters
     ----------
-    body : str
-        The body on the joint.
+    body : str or mapping of str to float
+        The body on the joint, or several, see `JointForce`.
     loss : float
         The force of every freedom that slides [N m or N]. In its place may stand a parameter, as in a `Body`.
     velocity : float
@@ -208,8 +255,8 @@ class Actuator(JointForce):
 
     Parameters
     ----------
-    body : str
-        The body on the joint, a hinge or slide.
+    body : str or mapping of str to float
+        The body on the joint, a hinge or slide, or several, see `JointForce`.
     input : str
         The parameter that controls it; 0 where a run says nothing else.
     gear : float
@@ -245,7 +292,7 @@ class Actuator(JointForce):
     def check(self, body: Body) -> None:
         """Raises MechanismError for a joint of several coordinates, and for numbers that are not finite."""
         self._require_axis(body)
-        where = f"Actuator on body {self.body!r}"
+        where = self.label
         check_name(f"the input of the {where}", self.input, spaces=False)
         self._require("gear", self.gear)
         for what, numbers in (("gain", self.gain), ("bias", self.bias)):
@@ -288,14 +335,16 @@ def check_any_force(force: AnyForce, carried: Container[str], bodies: Sequence[B
 
 def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
     named = {body.name: body for body in bodies}
-    if not isinstance(force.body, str) or force.body not in named:
-        raise MechanismError(f"there is a force on the joint of the unknown body {force.body!r:.80}")
-    body = named[force.body]
-    if body.joint.kind in COMPOSITIONS:
-        force._require_axis(body)
-    if not body.joint.type.moves:
-        raise MechanismError(f"there is a force on the joint of body {body.name!r}, which does not move")
-    force.check(body)
+    for name, share in force.shares.items() if isinstance(force.body, str | Mapping) else [(force.body, 1.0)]:
+        if not isinstance(name, str) or name not in named:
+            raise MechanismError(f"there is a force on the joint of the unknown body {name!r:.80}")
+        body = named[name]
+        force._require(f"the coefficient of {name!r}", share)
+        if body.joint.kind in COMPOSITIONS or not isinstance(force.body, str):
+            force._require_axis(body)
+        if not body.joint.type.moves:
+            raise MechanismError(f"there is a force on the joint of body {body.name!r}, which does not move")
+        force.check(body)
 
 
 def generalized_forces(
@@ -304,11 +353,13 @@ def generalized_forces(
     moving: Sequence[Body],
     state: tuple[Sequence[Node], Sequence[Node]],
     parameters: Mapping[str, Node],
+    locked: Mapping[str, Any],
 ) -> list[Node]:
     """Q = J^T f + J_w^T torque of all forces on bodies together, and those of joints: one node for each velocity.
 
     Virtual power is linear in qd: one reverse sweep, seeded with the forces, gives its slope along qd.
     chain: the joints between a body and the world.  moving: bodies.  state: q and qd.
+    locked: coordinates of joints that stand still.
     """
     build, (q, qd) = Builder(), state
     total: list[Node] = [ZERO] * len(qd)
@@ -319,11 +370,17 @@ def generalized_forces(
                 total = [sum_ + share for sum_, share in zip(total, shares, strict=True)]
     where = {body.name: place for body, place in zip(moving, places(moving), strict=True)}
     for force in [each for each in forces if isinstance(each, JointForce)]:
-        if (place := where.get(force.body)) is not None:
-            with building(Builder()), cg.tag(force.body, FORCE):
-                along = force.along(q[place.q], qd[place.u], parameters)
-                for k, node in zip(range(place.u.start, place.u.stop), along, strict=True):
-                    total[k] = total[k] + node
+        joints = [(share, where[name]) for name, share in force.shares.items() if name in where]
+        with building(Builder()), cg.tag(*force.shares, FORCE):
+            for share, at in joints:
+                coordinates, rates = q[at.q], qd[at.u]
+                if not isinstance(force.body, str):
+                    still = [share * float(locked.get(name, 0.0)) for name, share in force.shares.items()]
+                    coordinates = [sum([share * q[each.q.start] for share, each in joints], cg.constant(sum(still)))]
+                    rates = [sum([share * qd[each.u.start] for share, each in joints], ZERO)]
+                along = force.along(coordinates, rates, parameters)
+                for k, node in zip(range(at.u.start, at.u.stop), along, strict=True):
+                    total[k] = total[k] + share * node
     return total
 
 

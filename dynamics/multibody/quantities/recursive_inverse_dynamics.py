@@ -44,7 +44,7 @@ class RecursiveInverseDynamics:
     Raises
     ------
     ValueError
-        For a mechanism with external forces.
+        For a mechanism with external forces or gravity compensation.
 
     Examples
     --------
@@ -56,8 +56,9 @@ class RecursiveInverseDynamics:
 
     def __init__(self, mechanism: Mechanism) -> None:
         mechanism = require_mechanism(mechanism, "RecursiveInverseDynamics")
-        if mechanism.forces:
-            raise ValueError("inverse dynamics body by body does not take external forces; use inverse_dynamics")
+        if mechanism.forces or any([link.lift for link in mechanism.links]):
+            what = "external forces" if mechanism.forces else "gravity compensation"
+            raise ValueError(f"inverse dynamics body by body does not take {what}; use inverse_dynamics")
         self.mechanism = mechanism = mechanism.bind()
         rest = ground(np.asarray(mechanism.gravity, dtype=np.float64))
         self.n = len(mechanism.velocities)

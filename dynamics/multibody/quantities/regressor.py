@@ -34,7 +34,7 @@ def regressor(model: Model) -> Graph:
     pi: for each moving body the ten `PARAMETERS`, see `inertial_parameters`. Each partial Lagrangian is linear in them,
     so Y is the Jacobian of inverse dynamics by them: one reverse sweep a joint over the graph in which they are
     variables. A column of zeros is a parameter that no motion reveals; which combinations of the others do, the rank
-    of stacked Y tells.
+    of stacked Y tells. Forces that balance weight count as applied.
 
     Returns
     -------
@@ -109,6 +109,4 @@ def _symbolic(known: Link, axes: Array, pi: list[Node]) -> Link:
     inertia = [[entries[max(i, j), min(i, j)] for j in range(3)] for i in range(3)]
     into = MatrixTurn(axes.T.tolist())
     moment, turned = into.out((x, y, z)), into.second_moments(inertia)
-    return replace(
-        known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, spring_reference=0.0, armature=0.0
-    )
+    return replace(known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, armature=0.0, lift=None)

@@ -173,7 +173,9 @@ def _of_forces(system: System, mechanism: Mechanism | None, build: Builder) -> I
         together: dict[str, list[Force | JointForce | Contact]] = {}
         for force in mechanism.forces:
             kind = type(force).__name__.removeprefix("Joint").lower()
-            name = f"{kind} {'of' if isinstance(force, JointForce) else 'on'} {force.body}"
+            name = (
+                f"{kind} of {', '.join(force.shares)}" if isinstance(force, JointForce) else f"{kind} on {force.body}"
+            )
             together.setdefault(name, []).append(force)
         forces = {name: tuple(_along_velocities(mechanism, each)) for name, each in together.items()}
     for name, given in forces.items():
@@ -185,7 +187,7 @@ def _along_velocities(mechanism: Mechanism, forces: Sequence[Force | JointForce 
     """Some forces of a mechanism as generalized ones."""
     given = {name: cg.variable(name) for name in mechanism.parameter_values}
     q, qd = mechanism.system.q, mechanism.system.qd
-    return generalized_forces(forces, mechanism.chain, mechanism.moving, (q, qd), given)
+    return generalized_forces(forces, mechanism.chain, mechanism.moving, (q, qd), given, mechanism.locked)
 
 
 def _of_step(

@@ -136,7 +136,7 @@ def _moments(mechanism: Mechanism) -> Moments:
         states = link_states(mechanism.moving, mechanism.links, mechanism.parents, system.q, system.qd)
         for at, motion in zip(states, motions(states, Motion(angular, linear, vertical, ZERO)), strict=True):
             with cg.tag(at.name):
-                total = total + energy(motion, at)
+                total = total + energy(motion, at._replace(link=replace(at.link, lift=None)))
                 mass = mass + at.link.mass
     bars = cotangents({total: ONE}, ground, build)
     still = folded(substitute(bars, dict.fromkeys(ground, ZERO)), build)

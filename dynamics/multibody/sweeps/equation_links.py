@@ -40,6 +40,7 @@ class _Placed(NamedTuple):
     reach: float = 0.0
     angle: float = 0.0
     moved: float = 0.0
+    lift: Numbers | None = None
 
     @property
     def placed_by(self) -> int:
@@ -63,11 +64,15 @@ class _Placed(NamedTuple):
     def along(self, move: float) -> _Placed:
         """Link with its origin moved along its own axis."""
         place = spatial.added(self.place, move * self.turn[:, 2])
-        return self._replace(place=place, own=self.own.about(np.array([0.0, 0.0, -move])), moved=move)
+        offset = np.array([0.0, 0.0, -move])
+        return self._replace(
+            place=place, own=self.own.about(offset), moved=move, lift=self.lift and self.lift.about(offset)
+        )
 
     def turned(self, angle: float) -> _Placed:
         """Link on a hinge with its axes turned about the hinge's."""
-        return self._replace(own=self.own.turned(_about_z(-angle)), angle=angle)
+        turn = _about_z(-angle)
+        return self._replace(own=self.own.turned(turn), angle=angle, lift=self.lift and self.lift.turned(turn))
 
     def to_normal(self, parent_moved: float) -> _Placed:
         """Link with its origin on the common normal with the parent's axis, unless that is far away."""
@@ -109,7 +114,7 @@ def equation_links(
         if parent >= 0:
             children[parent].append(i)
     known = {
-        i: _Placed(np.array(link.turn, dtype=np.float64), link.offset, link.inertial, joint)
+        i: _Placed(np.array(link.turn, dtype=np.float64), link.offset, link.inertial, joint, lift=link.lift)
         for i, (link, joint) in enumerate(zip(links, joints, strict=True))
         if link.is_numeric
     }
@@ -184,4 +189,4 @@ def _about_z(angle: float) -> Array:
 def _link(link: Link, to: _Placed, angle: float) -> Link:
     """The link in other numbers.  angle: more than its axes are turned by."""
     place, angle = spatial.constant(to.place), to.angle + angle
-    return replace(link.with_inertial(to.own), turn=to.turn.tolist(), place=place, angle=angle)
+    return replace(link.with_inertial(to.own), turn=to.turn.tolist(), place=place, angle=angle, lift=to.lift)

@@ -125,7 +125,9 @@ def _joined(body: Body, other: Body) -> Body:
     """
     if _has_parameters(body) or _has_parameters(other):
         welded = body.welded if isinstance(body, MergedBody) else ()
-        return MergedBody(body.name, body.joint, body.parent, body.mass, body.center, body.inertia, (*welded, other))
+        return MergedBody(
+            body.name, body.joint, body.parent, body.mass, body.center, body.inertia, welded=(*welded, other)
+        )
     (mass, here), (more, there) = ((float(each.mass), np.asarray(each.center)) for each in (body, other))
     both = mass + more
     reduced = mass * (more / both) if both else 0.0

@@ -53,7 +53,8 @@ class Link:
     """A body in the axes of its motion: numbers, or nodes that stand for them.
 
     turn, place: its axes as columns, and its origin at q = 0, in the parent's axes.  moment: m c.  inertia: about the
-    origin.  angle: of a hinge, how far the axes are turned about its own beside its coordinate [rad].
+    origin.  angle: of a hinge, how far the axes are turned about its own beside its coordinate [rad].  lift: mass and
+    moment of what is weightless.
     """
 
     turn: Matrix  # (3, 3)
@@ -66,6 +67,14 @@ class Link:
     spring_reference: float | Node
     armature: float | Node
     angle: float = 0.0
+    lift: Numbers | None = None
+
+    @property
+    def weight(self) -> tuple[float | Node, Triple]:
+        """Mass and first moment that gravity pulls at."""
+        if self.lift is None:
+            return self.mass, self.moment
+        return self.mass - self.lift.mass, spatial.plus(self.moment, spatial.constant(-self.lift.moment))
 
     @cached_property
     def parallel(self) -> bool:
@@ -90,7 +99,8 @@ class Link:
     def is_numeric(self) -> bool:
         """Whether there are no parameters among the numbers of place and inertia."""
         moved = len(self.numbers) - 4  # the last four are those of the joint
-        return not any([isinstance(each, Node) for each in self.numbers[:moved]])
+        lift = [] if self.lift is None else [self.lift.mass, *self.lift.moment]
+        return not any([isinstance(each, Node) for each in (*self.numbers[:moved], *lift)])
 
     @property
     def inertial(self) -> Numbers:

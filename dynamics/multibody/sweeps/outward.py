@@ -168,8 +168,9 @@ def energy(motion: Motion, at: LinkState) -> Node:
         terms.append(0.5 * link.armature * spatial.total([velocity * velocity for velocity in at.u]))
         kinetic = spatial.total(terms)
     with cg.tag(POTENTIAL):
-        weight = scaled(motion.strength, link.moment)
-        potential = link.mass * motion.strength * motion.depth + spatial.dot(own.vertical, weight)
+        mass, moment = link.weight
+        weight = scaled(motion.strength, moment)
+        potential = mass * motion.strength * motion.depth + spatial.dot(own.vertical, weight)
         for stretch in at.stretches():
             potential = potential + 0.5 * link.stiffness * (stretch * stretch)
     return kinetic - potential
@@ -261,6 +262,11 @@ def wrench(acceleration: Acceleration, motion: Motion, at: LinkState) -> list[Bi
         torque = [a + b for a, b in zip(torque, cross(link.moment, motion.into(a)), strict=True)]
     with cg.tag(POTENTIAL):
         springs = at.springs()
+        if link.lift is not None:
+            up = scaled(motion.strength, motion.vertical)
+            force = plus(force, scaled(-link.lift.mass, up))
+            lifted = cross(spatial.constant(link.lift.moment), motion.into(up))
+            torque = [a - b for a, b in zip(torque, lifted, strict=True)]
     with cg.tag(KINETIC):
         armatures = [(velocity, link.armature * rate) for velocity, rate in zip(at.u, at.u_dot, strict=True)]
     return [*zip((*motion.velocity, *motion.omega), (*force, *torque), strict=True), *springs, *armatures]

@@ -30,7 +30,7 @@ COMPOSITE = "momentum"  # tag of what composite momenta are made of, and of the 
 
 
 class SubtreeMomentum(NamedTuple):
-    """Mass, first moment and momentum of a body and what it carries, about its origin, in its motion's axes."""
+    """Momentum of a body and what it carries, about its origin, in its motion's axes; mass and moment of its weight."""
 
     mass: Node
     moment: Triple
@@ -52,7 +52,8 @@ def _body_momentum(motion: Motion, link: Link) -> SubtreeMomentum:
         torque = STILL
         if not motion.plane:
             torque = plus(spatial.rotate(link.full_inertia, w), cross(h, v))
-    return SubtreeMomentum(mass, h, Wrench(torque, force))
+    weight, moment = link.weight
+    return SubtreeMomentum(as_node(weight), motion.out(moment), Wrench(torque, force))
 
 
 def _with_known_momenta(composite: SubtreeMomentum, at: LinkState, p: Sequence[Node]) -> SubtreeMomentum:

@@ -164,7 +164,7 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
             marks.setdefault(above[body.name], []).append(body.name)
     pins: dict[str, list[tuple[str, ArrayLike]]] = {}
     held = [loop for loop in mechanism.loops if loop.kind != "coupling"]
-    ends = [end for loop in held for end in ((loop.body, loop.at), (loop.to, loop.to_at))]
+    ends = [end for loop in held for end in zip(loop.bodies, (loop.at, loop.to_at), strict=True)]
     for name, at in [*ends, *contact_surfaces(mechanism.forces).centers]:
         pins.setdefault(name if name in moving else above.get(name, name), []).append((name, at))
     for body in mechanism.moving:

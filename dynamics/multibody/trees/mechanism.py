@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,7 @@ from ...systems.arguments import parameter_value
 from ...systems.body_terms import BodyTerms
 from ...systems.model import Model
 from ...systems.system import System
+from ..algebra import spatial
 from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
 from ..bodies.composed_joints import locked_parts, outer_names, require_parents
 from ..bodies.joint_coordinates import (
@@ -36,10 +37,10 @@ from ..forces.contact import Contact, check_contact, touch
 from ..forces.external_force import Force
 from ..forces.joint_force import JointForce, check_any_force, generalized_forces
 from ..loops import Loop, check_loops, of_loops, position_rows, velocity_rows
-from ..parameters import Quantity, bound, entries, names_in, symbol
+from ..parameters import Quantity, bound, entries, names_in, symbol, vanishes
 from ..sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from ..sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
-from ..sweeps.links import Link
+from ..sweeps.links import Link, Numbers
 from .joint_positions import skeleton
 from .structure import Structure, bound_body, bound_force, changed, checked_parts, listed, require_values, used_names
 from .tree_equations import TreeEquations
@@ -73,7 +74,7 @@ class Mechanism(Structure):
         In the world's axes [m/s^2]. In place of a number may stand a parameter, as in a `Body`.
     forces : sequence of Force, JointForce and Contact
         On bodies from outside, beside the joint forces tau; they enter the equations as J^T f. Along joints:
-        `JointLimit`, `JointFriction`, `Actuator`. And where bodies touch: `Contact`.
+        `JointSpring`, `JointLimit`, `JointFriction`, `Actuator`. And where bodies touch: `Contact`.
     parameters : mapping
         {name: value} of the parameters that bodies, joints, gravity and forces have. They are inputs of the graphs, and
         `simulate` binds them. Each needs a value with which the mechanism can be; only one that a `Force` or
@@ -88,6 +89,9 @@ class Mechanism(Structure):
     loops : sequence of Loop
         What holds bodies of the tree together, beside their joints, and closes it to loops. Motions, accelerations
         and linearizations are with them; mass matrix, bias, inverse dynamics, tables and the like are the tree's.
+    starts : mapping
+        {name: {"q.knee" or "qd.knee" or a parameter: number}} of states to start from, see `dyn.start`: the keyframes
+        of a file.
 
     Raises
     ------
@@ -117,6 +121,8 @@ class Mechanism(Structure):
         for what, allowed in kinds.items():  # kept, so that an iterator is read once
             object.__setattr__(self, what, listed(what, allowed, getattr(self, what)))
         parts = [part for body in self.bodies for part in checked_parts(body)]
+        for name, state in require_mapping("starts", self.starts, "name: state").items():
+            require_mapping(f"start {name!r:.60}", state, "name: number")
         for name, value in require_mapping("parameters", self.parameters, "name: value").items():
             parameter_value(name, value)  # before one is put in
         self._require_values(self.parameters, parts)
@@ -201,7 +207,22 @@ class Mechanism(Structure):
 
     @cached_property
     def _equations(self) -> TreeEquations:
-        return TreeEquations(self, self.moving)
+        return TreeEquations(self, self.moving, self._lifts)
+
+    @property
+    def _lifts(self) -> dict[str, Numbers]:
+        """What of each moving body, and of all that is welded to it, is weightless."""
+        lifts: dict[str, Numbers] = {}
+        with building(Builder()):
+            for body in self.parts:
+                carrier = self.carriers[body.name]
+                if carrier.name != WORLD and not vanishes(body.gravity_compensation):
+                    center = spatial.placed(carrier.position, carrier.orientation, np.asarray(body.center))
+                    mass: Any = symbol(body.gravity_compensation) * symbol(body.mass)
+                    known = lifts.get(carrier.name, Numbers(0.0, np.zeros(3), np.zeros((3, 3))))
+                    moment = spatial.added(known.moment, mass * center)
+                    lifts[carrier.name] = known._replace(mass=known.mass + mass, moment=moment)
+        return lifts
 
     @cached_property
     def system(self) -> System:
@@ -230,7 +251,9 @@ class Mechanism(Structure):
             require_values(self.parts if bodies is None else bodies, self.gravity, self.forces, values)
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
-        return generalized_forces(self.forces, lambda body: self._chain(body, q, qd), self.moving, (q, qd), p)
+        return generalized_forces(
+            self.forces, lambda body: self._chain(body, q, qd), self.moving, (q, qd), p, self.locked
+        )
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
         ends = [self.carriers[name] for name in (body, WORLD)]
@@ -364,7 +387,7 @@ def _summary(mechanism: Mechanism) -> list[str]:
     counted = f"{len(mechanism.bodies)} bodies, {len(mechanism.coordinates)} coordinate(s) {some}".rstrip()
     named = {
         "locked": list(mechanism.locked),
-        "forces on": [force.body for force in mechanism.forces],
+        "forces on": [", ".join(getattr(force, "shares", [force.body])) for force in mechanism.forces],
         "loops": [loop.label for loop in mechanism.loops],
     }
     parts = [counted + (", ..." if len(mechanism.coordinates) > SHOWN else "")]

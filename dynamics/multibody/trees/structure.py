@@ -86,6 +86,7 @@ class Structure(HoldsNodes):
     base_parameters: bool = False
     left_out: tuple[str, ...] = ()
     loops: Sequence[Loop] = ()
+    starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def parameter_values(self) -> dict[str, float]:
@@ -118,7 +119,7 @@ class Structure(HoldsNodes):
         names = descendants(self.bodies, body)
         bodies = {each.name: (place, each) for place, each in enumerate(self.bodies) if each.name in names}
         order = [body, *(name for name in bodies if name != body)]
-        forces = tuple([force for force in self.forces if not names.isdisjoint(_held(force))])
+        forces = tuple([force for force in self.forces if not names.isdisjoint(held(force))])
         taken = tuple([bodies[name][1] for name in order])
         used = used_names(taken, (), forces)
         return Subtree(
@@ -128,7 +129,7 @@ class Structure(HoldsNodes):
             forces,
             {name: value for name, value in self.parameters.items() if name in used},
             {name: at for name, at in self.locked.items() if name in names},
-            tuple([loop for loop in self.loops if not names.isdisjoint((loop.body, loop.to))]),
+            tuple([loop for loop in self.loops if not names.isdisjoint(loop.bodies)]),
         )
 
     def detach(self, body: str) -> Self:
@@ -140,9 +141,9 @@ class Structure(HoldsNodes):
         return changed(
             self,
             bodies=tuple([each for each in self.bodies if each.name not in names]),
-            forces=tuple([force for force in self.forces if names.isdisjoint(_held(force))]),
+            forces=tuple([force for force in self.forces if names.isdisjoint(held(force))]),
             locked={name: at for name, at in self.locked.items() if name not in names},
-            loops=tuple([loop for loop in self.loops if names.isdisjoint((loop.body, loop.to))]),
+            loops=tuple([loop for loop in self.loops if names.isdisjoint(loop.bodies)]),
         )
 
     def attach(self, subtree: Subtree | Body | Iterable[Body], to: str | None = None) -> Self:
@@ -209,8 +210,10 @@ def inserted(bodies: tuple[Body, ...], new: tuple[Body, ...], places: tuple[int,
     return result
 
 
-def _held(force: AnyForce) -> set[str]:
+def held(force: AnyForce) -> set[str]:
     """Names of the bodies that a force is on."""
+    if isinstance(force, JointForce):
+        return {*force.shares}
     return {force.body, force.to} if isinstance(force, Contact) else {force.body}
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +20,7 @@ from ..bodies.body import Body, quantities
 from ..joints import JointType
 from ..sweeps.base_parameters import base_parameter_links, without_axial_moments
 from ..sweeps.equation_links import equation_links
-from ..sweeps.links import Link, LinkState, link, link_states
+from ..sweeps.links import Link, LinkState, Numbers, axes_of, link, link_states
 from ..sweeps.mass_matrix import PlacedLink, mass_matrix_columns, size_of
 from ..sweeps.outward import Motion, base_acceleration, energy, ground, motions, wrenches
 from ..sweeps.subtree_momentum import momentum_rates
@@ -32,8 +33,8 @@ UNEVEN = 200.0  # times a body's moments of inertia, at most, for base numbers t
 class TreeEquations:
     """Nodes of the motion of bodies, parents first, under a structure's gravity."""
 
-    def __init__(self, structure: Structure, bodies: Sequence[Body]) -> None:
-        self.bodies, self.base_parameters = bodies, structure.base_parameters
+    def __init__(self, structure: Structure, bodies: Sequence[Body], lifts: Mapping[str, Numbers]) -> None:
+        self.bodies, self.base_parameters, self.lifts = bodies, structure.base_parameters, lifts
         self.gravity = quantities("gravity", structure.gravity)
 
     @cached_property
@@ -67,7 +68,11 @@ class TreeEquations:
     @cached_property
     def _own(self) -> list[Link]:
         carriers = [self.bodies[i] if i >= 0 else None for i in self.parents]
-        return [link(body, carrier) for body, carrier in zip(self.bodies, carriers, strict=True)]
+        links = [link(body, carrier) for body, carrier in zip(self.bodies, carriers, strict=True)]
+        for i, body in enumerate(self.bodies):
+            if lift := self.lifts.get(body.name):
+                links[i] = replace(links[i], lift=lift.turned(axes_of(body).T))
+        return links
 
     @cached_property
     def _placed(self) -> list[Link]:
@@ -100,7 +105,8 @@ class TreeEquations:
     @cached_property
     def _numeric(self) -> bool:
         """Whether no link has parameters."""
-        return not any([isinstance(number, Node) for link in self._own for number in link.numbers])
+        joints = [isinstance(number, Node) for link in self._own for number in link.numbers]
+        return not any(joints) and all([link.is_numeric for link in self._own])
 
     def states(
         self,
@@ -167,8 +173,8 @@ class TreeEquations:
             return momentum_rates(states, self._motions(states), p)
 
     def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives | None:
-        """Torques of all bodies, with their springs, and their derivatives."""
-        if not self._turning:
+        """Torques of all bodies, with their springs, and their derivatives; None also where weight is balanced."""
+        if self.lifts or not self._turning:
             return None
         from ..sweeps.torque_derivatives import torque_derivatives
 

@@ -29,27 +29,29 @@ BODIES = f"""<site name="world site" pos="0.2 0.1 0.9" euler="5 6 7"/>
    {INERTIAL}<site name="on tool" pos="0.1 0.2 0.3" euler="40 50 60"/></body></body></body></body>
 <body name="c" pos="0 1 1" euler="0 0 20"><freejoint/>{INERTIAL}<site name="on c" pos="0 0.1 0"/>
  <body name="d" pos="0.2 0 0.1"><joint name="jd" axis="1 0 1"/>{INERTIAL}</body></body>"""
+TENDONS = """<tendon><fixed name="one"><joint joint="ja" coef="2"/><joint joint="jb" coef="-3"/></fixed>
+<fixed name="two"><joint joint="jz" coef="0.5"/><joint joint="jd" coef="1"/></fixed></tendon>"""
 CONSTRAINTS = {
     "joints": '<joint joint1="jb" joint2="ja" polycoef="0.1 -0.4 0.3 0.2 -0.1"/><joint joint1="jz" joint2="jd"/>',
     "one joint": '<joint joint1="ja" polycoef="0.1 3 4 5 6"/>',
     "connect": '<connect body1="tool" body2="d" anchor="0.1 0.2 0.3"/>',
     "connect a site of the world": '<connect site1="world site" site2="on c"/>',
     "weld of the world": '<weld body1="world" body2="c" relpose="0.1 0.2 0.8 1 0.3 0.5 0"/>',
+    "tendons": '<tendon tendon1="one" tendon2="two" polycoef="0.1 -0.4 0.3 0.2 -0.1"/>',
+    "one tendon": '<tendon tendon1="one" polycoef="0.1 3 4 5 6"/>',
     "weld of points": '<weld body1="b" body2="c" anchor="0.3 0.1 0.2" torquescale="0"/>',
 }
 OTHERS = {
     "connect sites": '<connect site1="on tool" site2="on c"/>',
     "weld sites": '<weld site1="on tool" site2="on c"/>',
     "weld": '<weld body1="b2" body2="d" anchor="0.3 0.1 0.2" torquescale="0.2"/>',
-    "connect to the world": '<connect body1="d" anchor="0.1 0.2 0.3"/>',
-    "weld at origins": '<weld body1="b" body2="d"/>',
     "weld apart": '<weld body1="tool" body2="c" relpose="0.1 0.2 0.3 1 1 0.5 0" anchor="0.2 0.3 -0.1"/>',
     "weld to the world": '<weld body1="d"/>',
 }
 
 
 def text_of(equality: str, option: str = "") -> str:
-    return f"<mujoco>{option}<worldbody>{BODIES}</worldbody><equality>{equality}</equality></mujoco>"
+    return f"<mujoco>{option}<worldbody>{BODIES}</worldbody>{TENDONS}<equality>{equality}</equality></mujoco>"
 
 
 def rows(model: Any, data: Any, q: Array) -> tuple[Array, Array]:

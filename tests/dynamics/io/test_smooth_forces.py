@@ -8,6 +8,7 @@ import pytest
 from pytest import approx, mark, raises
 
 import dynamics as dyn
+from dynamics.scenes.start import with_start
 from tests.dynamics.io.test_contacts import silently
 
 MUJOCO_ERROR = 1e-12  # relative to the largest acceleration
@@ -34,44 +35,92 @@ ROBOT = """<robot name="r"><link name="base"/><link name="arm"><inertial><mass v
 <dynamics damping="0.2" friction="0.3"/></joint></robot>"""
 
 
+PART = '<inertial pos="0.1 0.2 -0.3" mass="1.3" fullinertia="0.3 0.4 0.5 0.01 0.02 -0.03"/>'
+HAND = f"""<mujoco><option>{{flags}}</option><worldbody><body name="m" mocap="true"/><body name="a" gravcomp="0.7">
+<joint name="ja" axis="0 1 0" ref="20"/>{PART}<body name="b" gravcomp="1.4" pos=".1 .2 .3" euler="10 20 30">{PART}
+<site name="s" pos=".1 .2 .3" euler="40 10 20"/><body name="c" gravcomp="-0.3" pos=".1 0 .4"><joint name="jc"
+ type="slide" ref=".2"/>{PART}
+<body name="d" gravcomp="0.3"><joint name="jd" type="slide" axis="1 2 3"/>{PART}</body></body></body>
+</body><body name="f" gravcomp="2" pos="1 2 3"><freejoint name="root"/>{PART}
+<site name="sf" pos=".3 .2 .1" euler="40 10 20"/></body>
+</worldbody><tendon><fixed name="t" stiffness="3" damping=".5" springlength=".1 .2" limited="true" range="0 1"
+ frictionloss="2"><joint joint="ja" coef="2"/><joint joint="jc" coef="-.4"/></fixed><fixed name="u" stiffness="3">
+<joint joint="jd" coef="2"/><joint joint="jc" coef="-.4"/><joint joint="ja" coef="-.4"/></fixed></tendon><actuator>
+<position name="x" tendon="t" kp="10" kv="2" gear="3" ctrlrange="-1 1" forcerange="-30 30"/>
+<motor name="y" site="s" gear="1 2 3 4 5 6"/><motor name="z" joint="root" gear="6 5 4 1 2 3" ctrlrange="-.1 .2"/>
+<motor name="u" jointinparent="root" gear="6 5 4 1 2 3"/><position name="v" site="sf" kp="3" gear="3 2 1 1 2 2"/>
+<motor name="w" joint="ja"/></actuator><keyframe><key name="home" qpos=".1 .2 .3 1 2 3 4 5 6 7" qvel="1 2 3 4 5 6 7 8 9"
+ ctrl="1 2 3 4 5 6"/><key/></keyframe></mujoco>"""
+NO_RANGES = '<flag contact="disable" limit="disable" frictionloss="disable"/>'
+
+
 def compiled(flags: str = "", more: str = "") -> Any:
     mj = pytest.importorskip("mujoco").MjModel.from_xml_string(MODEL.format(flags=flags, more=more))
     mj.opt.disableactuator = 1 << 2
     return mj
 
 
-def test_actuators_are_those_of_mujoco() -> None:
-    """Gear, gain and bias, all three ranges, groups that are off: accelerations of random states and inputs."""
-    mj = compiled('<flag contact="disable" limit="disable" frictionloss="disable"/>')
+@mark.parametrize("hand", [False, True])
+def test_forces_are_those_of_mujoco(hand: bool) -> None:
+    """Gear, gain and bias, ranges, groups that are off; of a hand, tendons, sites, balanced weights: accelerations."""
     mujoco = pytest.importorskip("mujoco")
-    model = dyn.load_mjcf(mj, **SMOOTH)  # nothing to warn of
+    mj = mujoco.MjModel.from_xml_string(HAND.format(flags=NO_RANGES)) if hand else compiled(NO_RANGES)
+    model = silently(dyn.load_mjcf, mj, **SMOOTH)
     forward, rng = dyn.forward_dynamics(model), np.random.default_rng(1)
-    assert model.left_out == ()
-    assert forward.input_names[-5:] == tuple(INPUTS)
+    assert model.left_out == ("motions of mocap bodies, which stand where the file has them (m)",) * hand
+    inputs = [f"ctrl_{name}" for name in "xyzuvw"] if hand else INPUTS
+    assert sorted(forward.input_names[-len(inputs) :]) == sorted(inputs)
+    assert dyn.certify(model, states=3, twin=mj).residuals[-1].passed
     clipped = 0
     for _ in range(50):
         data = mujoco.MjData(mj)
         for field in (data.qpos, data.qvel, data.ctrl, data.qfrc_applied):
             field[:] = rng.normal(size=len(field))
+        mujoco.mj_normalizeQuat(mj, data.qpos)
         mujoco.mj_forward(mj, data)
-        clipped += abs(data.qfrc_actuator[0]) == 200.0
-        given = [*data.qpos, *data.qvel, *data.qfrc_applied, *data.ctrl[:5]]
-        ours = np.array(list(forward.evaluate(dict(zip(forward.input_names, given, strict=True))).values()))
+        clipped += abs(data.actuator_force[0]) == 30.0 if hand else abs(data.qfrc_actuator[0]) == 200.0
+        given = [*data.qpos, *data.qvel, *data.qfrc_applied]
+        at = dict(zip(forward.input_names, given, strict=False)) | dict(zip(inputs, data.ctrl, strict=False))
+        ours = np.array(list(forward.evaluate(at).values()))
         assert ours == approx(data.qacc, abs=MUJOCO_ERROR * np.abs(data.qacc).max())
     assert 10 < clipped < 50
 
 
+def test_a_keyframe_is_the_state_that_mujoco_starts_from() -> None:
+    """By name or number, with inputs, and what is left of it where a joint is locked and a body taken off."""
+    mujoco = pytest.importorskip("mujoco")
+    mj = mujoco.MjModel.from_xml_string(HAND.format(flags=""))
+    model, data = silently(dyn.load_mjcf, mj, **SMOOTH), mujoco.MjData(mj)
+    for k, key in ((0, "home"), (0, 0), (1, "key 1")):
+        mujoco.mj_resetDataKeyframe(mj, data, k)
+        q, qd = dyn.start(model, key)
+        assert (q.tolist(), qd.tolist()) == (data.qpos.tolist(), data.qvel.tolist())
+    scene = with_start(dyn.scenes.of_model(model), "home")
+    assert [scene.parameters[f"ctrl_{name}"] for name in "xyzuvw"] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    q, qd = dyn.start(model.lock("a", 0.3).detach("f"), "home")
+    assert (q.tolist(), qd.tolist()) == ([0.2, 0.3], [2.0, 3.0])
+    with raises(ValueError, match="there is no start 'hone'; did you mean 'home'"):
+        dyn.start(model, "hone")
+    on_tendon = {type(force).__name__: force.body for force in model.forces if isinstance(force.body, dict)}
+    assert [[*on_tendon[kind]] for kind in ("JointLimit", "JointFriction")] == [["a", "c"]] * 2
+
+
+def test_half_a_balanced_weight_takes_half_the_torque_and_energy_stays() -> None:
+    """m g l sin q / 2; the same by every formulation, and a share that is a parameter."""
+    rod = dyn.Body("rod", dyn.Joint("revolute", (0, 1, 0)), mass=1.0, center=(0, 0, -1), gravity_compensation="share")
+    model = dyn.Mechanism([rod], parameters={"share": 0.5})
+    at = {"q0": 0.3, "qd0": 0.0, "qdd0": 0.0, "share": 0.5}
+    for name in ("chain_rule", "chain_rule_literal", "newton_euler"):
+        torque = dyn.inverse_dynamics(model, name).evaluate(at)["tau0"]
+        assert torque == approx(1.449526613674, rel=1e-12)
+    run, energy = dyn.simulate(model, [0.3], [0.0], 2.0, rtol=1e-12, atol=1e-12), dyn.energy(model)
+    ends = [energy.evaluate({"q0": run.q[k, 0], "qd0": run.qd[k, 0], "share": 0.5})["E"] for k in (0, -1)]
+    assert ends[1] == approx(ends[0], rel=1e-10)
+    assert dyn.forward_dynamics(model).evaluate({"q0": 1.0, "qd0": 0.0, "tau0": 0.0, "share": 1.0})["qdd0"] == 0.0
+
+
 def test_what_is_taken_is_not_left_out_and_the_rest_is() -> None:
     mj = compiled(more='<intvelocity name="memory" joint="jc" kp="3" actrange="-1 1"/>')
-    none = silently(dyn.load_mjcf, mj)
-    assert not none.forces
-    assert [text.split(" (")[0] for text in none.left_out] == [
-        "contacts",
-        "joint limits",
-        "friction loss",
-        "actuators",
-        "actuators that act with no input",
-    ]
     with pytest.warns(
         dyn.MechanismWarning, match=r"left out contacts \(.*\); actuators that act with no input .memory"
     ):
@@ -134,14 +183,6 @@ def test_a_limit_gives_back_what_it_took_but_for_its_damping(side: float, unit: 
         returned = -run.qd[-1, 0] / (side * unit)
         assert returned == approx(1.0 - 2.0 / 3.0 * d, abs=d * d + RUN_ERROR)
         assert (side * run.forces[:, 0] <= 0.0).all()
-
-
-def test_friction_brings_a_body_to_rest_in_the_time_of_dry_friction() -> None:
-    """v0 m / loss, but for the last creep of the smooth law."""
-    for friction, error in ((dyn.JointFriction("cart", 4.0, 1e-4), 1e-3), (dyn.JointFriction("cart", 4.0), 1e-12)):
-        run = dyn.simulate(cart(friction), [0.0], [1.0], 0.6, "radau", t_eval=[0.4, 0.6])
-        assert run.qd[:, 0] == approx([1.0 - 4.0 / 2.0 * 0.4, 0.0], abs=error)
-        assert (run.forces * run.qd <= 0.0).all()
 
 
 def test_joint_forces_go_with_their_bodies() -> None:

@@ -80,7 +80,7 @@ ELSEWHERE = {
     *("gradient", "gradient_many"),  # tests of gradients, which are compared with sensitivities
     *("hamiltonian", "hamilton_equations", "conserved"),  # which refuse it, and name what it does not hold
     "to_mjcf",  # tests of files
-    *("arrays_at", "display_names"),  # numbers and names of any graph
+    *("arrays_at", "display_names", "start"),  # numbers and names of any graph or model
 }
 
 

@@ -287,13 +287,17 @@ def urdf(parents: list[int]) -> str:
     return f'<robot name="r"><link name="world"/>{"".join(links)}</robot>'
 
 
-def test_a_twin_may_have_its_joints_in_another_order() -> None:
-    """MuJoCo goes down each branch before the next, whatever the order of a URDF is."""
+def test_a_urdf_file_is_a_twin_whatever_the_order_of_its_joints(tmp_path) -> None:
+    """MuJoCo goes down each branch before the next. Shapes are not read, so a mesh that is not there is no reason."""
     pytest.importorskip("mujoco")
-    text = urdf([-1, 0, 0, 1, 2, 1])
+    file, text = tmp_path / "arm.urdf", urdf([-1, 0, 0, 1, 2, 1])
+    mesh = '<visual><geometry><mesh filename="nowhere.stl"/></geometry></visual><inertial>'
+    file.write_text(text.replace("<inertial>", mesh))
     mechanism = dyn.load_urdf(text)
     assert mechanism.coordinates == tuple([f"j{k}" for k in range(6)])
-    assert failed(certify(mechanism, FEW, twin=text)) == {}
+    found = certify(mechanism, FEW, twin=file)
+    assert failed(found) == {}
+    assert "inverse dynamics = MuJoCo's" in [each.equation for each in found.residuals]
 
 
 def test_the_command_translates_what_mujoco_cannot_read(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
