@@ -128,6 +128,8 @@ class System(HoldsNodes):
         require_known("damping", damped, p.values(), f"no parameter (it has {', '.join(p) or 'none'})")
         self.constraints = Constraints(self.kinematics, self.t, self.parameters, constraints, velocity_constraints)
         self.require_known("the system", self._given, p)
+        if body_terms is None:  # rows of loops may be 0, such as those across a plane
+            self.constraints.require_slopes()
 
     def require_known(self, what: str, nodes: Sequence[Node], parameters: Mapping[str, Node]) -> None:
         """Raises ValueError for a variable that is neither of the state, nor t, nor one of these parameters."""
