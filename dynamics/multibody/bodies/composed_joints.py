@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph._shared import Array, is_finite, require_mapping
+from cgraph._shared import Array, is_finite, or_nearest, require_mapping
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS
@@ -55,10 +55,12 @@ def parts_of(body: Body) -> list[Body]:
 
 def require_parents(bodies: Sequence[Body]) -> None:
     """Raises MechanismError for a parent that is no body, such as what is inside of a composed joint."""
-    known = {WORLD, *[body.name for body in bodies]}
+    known = dict.fromkeys([WORLD, *[body.name for body in bodies]])
     for body in bodies:
         if body.parent not in known:
-            raise MechanismError(f"body {body.name!r} has the unknown parent {body.parent!r}")
+            raise MechanismError(
+                f"body {body.name!r} has the unknown parent {body.parent!r}; {or_nearest(body.parent, [*known])}"
+            )
 
 
 @contextmanager

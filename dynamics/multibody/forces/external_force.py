@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
+from cgraph._shared import or_nearest
 from cgraph.extend import topological
 
 from ..algebra.spatial import Triple
@@ -68,10 +69,12 @@ class Force:
         return named | {each for each in self.components if isinstance(each, str)}
 
 
-def check_force(force: Force, bodies: Container[str]) -> None:
+def check_force(force: Force, bodies: Collection[str]) -> None:
     """Raises MechanismError unless the force is three and three components at a point of one of `bodies`."""
     if not isinstance(force.body, str) or force.body not in bodies:
-        raise MechanismError(f"there is a force on the unknown body {force.body!r:.80}")
+        raise MechanismError(
+            f"there is a force on the unknown body {force.body!r:.80}; {or_nearest(str(force.body), [*bodies])}"
+        )
     where = f"the force on body {force.body!r}"
     vector(f"{where}: at", force.at)
     if force.frame not in FRAMES:

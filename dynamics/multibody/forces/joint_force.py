@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import check_name, real_array, real_number
+from cgraph._shared import check_name, or_nearest, real_array, real_number
 from cgraph.extend import Builder, building, cotangents
 
 from ...systems.kinematics import gathered
@@ -276,7 +276,7 @@ def _within(node: Node, limits: Range | None) -> Node:
 AnyForce = Force | JointForce | Contact
 
 
-def check_any_force(force: AnyForce, carried: Container[str], bodies: Sequence[Body]) -> None:
+def check_any_force(force: AnyForce, carried: Collection[str], bodies: Sequence[Body]) -> None:
     """Raises MechanismError for a force that bodies, or the joint of one, cannot have.  carried: names of bodies."""
     if isinstance(force, JointForce):
         _check_joint_force(force, bodies)
@@ -289,7 +289,8 @@ def check_any_force(force: AnyForce, carried: Container[str], bodies: Sequence[B
 def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
     named = {body.name: body for body in bodies}
     if not isinstance(force.body, str) or force.body not in named:
-        raise MechanismError(f"there is a force on the joint of the unknown body {force.body!r:.80}")
+        known = or_nearest(str(force.body), [*named])
+        raise MechanismError(f"there is a force on the joint of the unknown body {force.body!r:.80}; {known}")
     body = named[force.body]
     if body.joint.kind in COMPOSITIONS:
         force._require_axis(body)

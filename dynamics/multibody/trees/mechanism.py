@@ -291,7 +291,9 @@ class Mechanism(Structure):
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
         if not isinstance(body, str) or body not in self.carriers:
-            raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
+            raise MechanismError(
+                f"there is no body {body!r:.80} in the mechanism; {or_nearest(str(body), [*self.carriers])}"
+            )
         return self._chain(body, self.system.q, self.system.qd)
 
     def joint_positions(self, q: ArrayLike) -> Array:
