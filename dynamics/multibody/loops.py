@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import Array, is_finite, or_nearest
+from cgraph._shared import Array, is_finite
 from cgraph.extend import Builder, building
 
 from ..equations.constraints.nearly_redundant_rows import without_nearly_redundant
 from ..systems.constraints import Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple
-from .bodies.body import WORLD, Body, MechanismError, checked_name, checked_rotation, vector
+from .bodies.body import WORLD, Body, MechanismError, checked_name, checked_rotation, unknown_body, vector
 from .joints import COMPOSITIONS
 from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier
@@ -184,9 +184,7 @@ def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     """Raises MechanismError unless the loop's bodies are there and its numbers are what its kind needs."""
     for name in (loop.body, loop.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
-            raise MechanismError(
-                f"there is a loop on the unknown body {name!r:.80}; {or_nearest(str(name), [*bodies])}"
-            )
+            raise unknown_body("a loop on the unknown body", name, bodies)
     checked_name("a loop", loop.label if isinstance(loop.name, str) else loop.name)
     where = f"loop {loop.label!r}"
     for what in ("at", "to_at"):

@@ -120,9 +120,21 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
     for chosen, last in ((arguments, "p"), (arguments[:-1], "t")):
         if _takes(function, len(chosen)) and not _keeps(function, len(chosen) - 1, last):
-            _require_order(what, function, names)
-            return _called(what, function, chosen)
-    raise TypeError(f"{what} must take {names}, got {inspect.signature(function)}")
+            break
+    else:
+        raise TypeError(f"{what} must take {names}, got {inspect.signature(function)}")
+    _require_order(what, function, names)
+    token = formulating.set(True)
+    try:
+        return function(*chosen)
+    except (TypeError, AttributeError, IndexError, KeyError) as error:  # of Python, on nodes or a list of them
+        hint = next((hint for pattern, hint in HINTS.items() if re.search(pattern, str(error))), None)
+        if hint is None:
+            raise
+        hint += "; what needs numbers is a SampledController" if hint is ONCE and "controller" in what else ""
+        raise TypeError(f"{what}: {hint} ({error})") from error
+    finally:
+        formulating.reset(token)
 
 
 def _require_order(what: str, function: Callable[..., object], names: str) -> None:
@@ -133,21 +145,6 @@ def _require_order(what: str, function: Callable[..., object], names: str) -> No
     if [name for name in wrong if name != "p" or given.index("p") == right.index("t")]:
         more = "; conditions on velocities belong to velocity_constraints=" if what == "constraints" else ""
         raise TypeError(f"{what} must take {names}, in this order, got ({', '.join(given)}){more}")
-
-
-def _called(what: str, function: Callable[..., object], arguments: Sequence[object]) -> object:
-    """function(*arguments). An error of Python that a node or a list of nodes caused says what would be right."""
-    token = formulating.set(True)
-    try:
-        return function(*arguments)
-    except (TypeError, AttributeError, LookupError) as error:
-        hint = next((hint for pattern, hint in HINTS.items() if re.search(pattern, str(error))), None)
-        if type(error) not in (TypeError, AttributeError, IndexError, KeyError) or hint is None:
-            raise
-        hint += "; what needs numbers is a SampledController" if hint is ONCE and "controller" in what else ""
-        raise TypeError(f"{what}: {hint} ({error})") from error
-    finally:
-        formulating.reset(token)
 
 
 def _takes(function: Callable[..., object], count: int) -> bool:

@@ -31,29 +31,26 @@ class Energies(NamedTuple):
 
 
 def energies(lagrangian: Node, velocities: Sequence[Node]) -> Energies:
-    """K and P: the terms tagged so; of all others P is the energy at rest, and K = E - P with the energy E.
-
-    A term tagged "potential" that depends on velocities is in neither.
-    """
+    """K and P: terms tagged so, P without velocities; of all others P is the energy at rest, and K = E - P."""
     moving, kinds = _moving(lagrangian, velocities), dict[Node, str]()
-    untagged = set(topological([lagrangian]))
-    for node in list(untagged):
-        if len(tags := node.tags & {"kinetic", "potential"}) == 1:
-            kinds[node] = "neither" if "potential" in tags and node in moving else min(tags)
-            untagged.remove(node)
-    terms = list(signed_terms(lagrangian, untagged))
-    rest = [(sign, node) for sign, node in terms if node in untagged]
+    for node in topological([lagrangian]):
+        tags = node.tags & {"kinetic", "potential"}
+        kinds[node] = min(tags) if len(tags) == 1 and not ("potential" in tags and node in moving) else ""
+    terms = list(signed_terms(lagrangian, [node for node, kind in kinds.items() if not kind]))
+    kinetic, potential, rest = (
+        [each for each in terms if kinds[each[1]] == kind] for kind in ("kinetic", "potential", "")
+    )
     if len(rest) == len(terms):
         return Energies(*_by_rest(lagrangian, velocities), "E - P, the energy less that at rest")
-    kinetic, potential, both = _by_rest(added(rest), velocities)
-    tagged = {kind: [each for each in terms if kinds.get(each[1]) == kind] for kind in ("kinetic", "neither")}
-    below = [(-sign, node) for sign, node in terms if kinds.get(node) == "potential"]
-    found = added([*tagged["kinetic"], (1, kinetic)])
-    if tagged["neither"] or both is not kinetic:
-        both = added([*tagged["kinetic"], *tagged["neither"], (1, both)])
-    else:
-        both = found
-    return Energies(found, added([*below, (1, potential)]), both, "the terms of L tagged 'kinetic'")
+    more, below, both = _by_rest(added(rest), velocities)
+    found = added([*kinetic, (1, more)])
+    both = found if both is more else added([*kinetic, (1, both)])
+    return Energies(
+        found,
+        added([*[(-sign, node) for sign, node in potential], (1, below)]),
+        both,
+        "the terms of L tagged 'kinetic'",
+    )
 
 
 def split_by_motion(lagrangian: Node, velocities: Sequence[Node]) -> tuple[Node, Node]:

@@ -27,8 +27,8 @@ def limits_left(run: Trajectory, limits: Mapping[str, Mapping[str, Pair]], units
         for name, (lower, upper) in limits.get(what, {}).items():
             k, unit = names.index(name), units[name] + per
             alike = [i for i, other in enumerate(names) if units[other] == units[name]]
-            sizes = [*np.abs(states[part][:, alike]).max(axis=0), *np.abs([x for x in (lower, upper) if np.isfinite(x)])]
-            rounding = ROUNDING * max(sizes)
+            sizes = np.abs([*states[part][:, alike].ravel(), *[x for x in (lower, upper) if np.isfinite(x)]])
+            rounding = ROUNDING * sizes.max()
             if (left := _left(run, part, k, (lower, upper), t, states[part][:, k], rounding)) is not None:
                 first, value, at = left
                 bounds = f"{what} of {name} leaves {lower:.6g} to {upper:.6g} {unit} at {first:.4g} s"

@@ -35,7 +35,7 @@ def load(
 ) -> AccuracyTask:
     """The task of that name: of `TASKS`, a scene, a case, or an MJCF or URDF file.
 
-    t_end [s], start: in place of its own, which is `moving_start` of a scene or a file.  reading: options of `dynamics.scenes.of_file`.
+    t_end [s], start: in place of its own, or of `moving_start`.  reading: options of `dynamics.scenes.of_file`.
     Raises ValueError for a name that is none of these, a horizon that is not positive, or a start of another length.
     """
     fixed = TASKS.get(name) or (partial(cases.load, name) if name in cases.names() else None)

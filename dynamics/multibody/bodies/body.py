@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph._shared import Array, check_name, is_finite
+from cgraph._shared import Array, check_name, is_finite, or_nearest
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS, TYPES, JointType
@@ -305,6 +305,11 @@ def _pitch(where: str, joint: Joint) -> float:
         needs = f"only a screw has a pitch, not {kind!r}" if pitch else f"a joint of the kind {kind!r} needs a pitch"
         raise MechanismError(f"{where}: {needs}, got {pitch!r} m/rad")
     return float(pitch)
+
+
+def unknown_body(what: str, name: object, known: Iterable[str]) -> MechanismError:
+    """The error of a name that is no body's.  what: such as "a force on the unknown body"."""
+    return MechanismError(f"there is {what} {name!r:.80}; {or_nearest(str(name), [*known])}")
 
 
 def checked_name(what: str, name: str, *, spaces: bool = True) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph._shared import Array, is_finite, or_nearest, require_mapping
+from cgraph._shared import Array, is_finite, require_mapping
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS
@@ -25,6 +25,7 @@ from .body import (
     checked_rotation,
     quantities,
     unit_axis,
+    unknown_body,
     vector,
 )
 
@@ -55,12 +56,10 @@ def parts_of(body: Body) -> list[Body]:
 
 def require_parents(bodies: Sequence[Body]) -> None:
     """Raises MechanismError for a parent that is no body, such as what is inside of a composed joint."""
-    known = dict.fromkeys([WORLD, *[body.name for body in bodies]])
+    known = {WORLD, *[body.name for body in bodies]}
     for body in bodies:
         if body.parent not in known:
-            raise MechanismError(
-                f"body {body.name!r} has the unknown parent {body.parent!r}; {or_nearest(body.parent, [*known])}"
-            )
+            raise unknown_body(f"a body {body.name!r} with the unknown parent", body.parent, known)
 
 
 @contextmanager

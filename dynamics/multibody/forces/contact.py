@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import is_finite, or_nearest
+from cgraph._shared import is_finite
 from cgraph.extend import as_node
 
 from ..algebra import spatial
 from ..algebra.spatial import Triple, cross, dot, plus, scaled
-from ..bodies.body import WORLD, MechanismError, quantity, unit_axis, vector
+from ..bodies.body import WORLD, MechanismError, quantity, unit_axis, unknown_body, vector
 from ..parameters import Quantity, names_in, symbol, vanishes
 from ..sweeps.kinematic_chain import KinematicChain
 
@@ -142,9 +142,7 @@ def check_contact(contact: Contact, bodies: Collection[str]) -> None:
     """Raises MechanismError for a contact on a body that is not among `bodies`, and for numbers out of range."""
     for name in (contact.body, contact.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is contact.body)):
-            raise MechanismError(
-                f"there is a contact on the unknown body {name!r:.80}; {or_nearest(str(name), [*bodies])}"
-            )
+            raise unknown_body("a contact on the unknown body", name, bodies)
     where = contact.label
     if contact.body == contact.to:
         raise MechanismError(f"{where}: a contact needs two bodies")

@@ -13,11 +13,10 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import or_nearest
 from cgraph.extend import topological
 
 from ..algebra.spatial import Triple
-from ..bodies.body import MechanismError, vector
+from ..bodies.body import MechanismError, unknown_body, vector
 from ..sweeps.kinematic_chain import KinematicChain
 
 FORCE = "force"  # tag
@@ -72,9 +71,7 @@ class Force:
 def check_force(force: Force, bodies: Collection[str]) -> None:
     """Raises MechanismError unless the force is three and three components at a point of one of `bodies`."""
     if not isinstance(force.body, str) or force.body not in bodies:
-        raise MechanismError(
-            f"there is a force on the unknown body {force.body!r:.80}; {or_nearest(str(force.body), [*bodies])}"
-        )
+        raise unknown_body("a force on the unknown body", force.body, bodies)
     where = f"the force on body {force.body!r}"
     vector(f"{where}: at", force.at)
     if force.frame not in FRAMES:

@@ -11,12 +11,12 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import check_name, or_nearest, real_array, real_number
+from cgraph._shared import check_name, real_array, real_number
 from cgraph.extend import Builder, building, cotangents
 
 from ...systems.kinematics import gathered
 from ..algebra.spatial import ZERO
-from ..bodies.body import Body, MechanismError, quantity
+from ..bodies.body import Body, MechanismError, quantity, unknown_body
 from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
 from ..parameters import Quantity, names_in, symbol
@@ -289,8 +289,7 @@ def check_any_force(force: AnyForce, carried: Collection[str], bodies: Sequence[
 def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
     named = {body.name: body for body in bodies}
     if not isinstance(force.body, str) or force.body not in named:
-        known = or_nearest(str(force.body), [*named])
-        raise MechanismError(f"there is a force on the joint of the unknown body {force.body!r:.80}; {known}")
+        raise unknown_body("a force on the joint of the unknown body", force.body, named)
     body = named[force.body]
     if body.joint.kind in COMPOSITIONS:
         force._require_axis(body)

@@ -19,7 +19,7 @@ from ...systems.arguments import parameter_value
 from ...systems.body_terms import BodyTerms
 from ...systems.model import Model
 from ...systems.system import System
-from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
+from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, unknown_body, vector
 from ..bodies.composed_joints import locked_parts, outer_names, require_parents
 from ..bodies.joint_coordinates import (
     coordinate_names,
@@ -291,9 +291,7 @@ class Mechanism(Structure):
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
         if not isinstance(body, str) or body not in self.carriers:
-            raise MechanismError(
-                f"there is no body {body!r:.80} in the mechanism; {or_nearest(str(body), [*self.carriers])}"
-            )
+            raise unknown_body("no body", body, self.carriers)
         return self._chain(body, self.system.q, self.system.qd)
 
     def joint_positions(self, q: ArrayLike) -> Array:
