@@ -184,7 +184,7 @@ def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     """Raises MechanismError unless the loop's bodies are there and its numbers are what its kind needs."""
     for name in (loop.body, loop.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
-            raise unknown_body("a loop on the unknown body", name, bodies)
+            raise unknown_body(f"there is a loop on the unknown body {name!r:.80}", name, bodies)
     checked_name("a loop", loop.label if isinstance(loop.name, str) else loop.name)
     where = f"loop {loop.label!r}"
     for what in ("at", "to_at"):

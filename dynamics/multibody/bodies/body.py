@@ -307,9 +307,9 @@ def _pitch(where: str, joint: Joint) -> float:
     return float(pitch)
 
 
-def unknown_body(what: str, name: object, known: Iterable[str]) -> MechanismError:
-    """The error of a name that is no body's.  what: such as "a force on the unknown body"."""
-    return MechanismError(f"there is {what} {name!r:.80}; {or_nearest(str(name), [*known])}")
+def unknown_body(sentence: str, name: object, known: Iterable[str]) -> MechanismError:
+    """The error of a name that is no body's: the sentence, and the names that are near."""
+    return MechanismError(f"{sentence}; {or_nearest(str(name), [*known])}")
 
 
 def checked_name(what: str, name: str, *, spaces: bool = True) -> None:

@@ -59,7 +59,7 @@ def require_parents(bodies: Sequence[Body]) -> None:
     known = {WORLD, *[body.name for body in bodies]}
     for body in bodies:
         if body.parent not in known:
-            raise unknown_body(f"a body {body.name!r} with the unknown parent", body.parent, known)
+            raise unknown_body(f"body {body.name!r} has the unknown parent {body.parent!r}", body.parent, known)
 
 
 @contextmanager

@@ -142,7 +142,7 @@ def check_contact(contact: Contact, bodies: Collection[str]) -> None:
     """Raises MechanismError for a contact on a body that is not among `bodies`, and for numbers out of range."""
     for name in (contact.body, contact.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is contact.body)):
-            raise unknown_body("a contact on the unknown body", name, bodies)
+            raise unknown_body(f"there is a contact on the unknown body {name!r:.80}", name, bodies)
     where = contact.label
     if contact.body == contact.to:
         raise MechanismError(f"{where}: a contact needs two bodies")

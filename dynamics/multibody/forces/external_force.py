@@ -71,7 +71,7 @@ class Force:
 def check_force(force: Force, bodies: Collection[str]) -> None:
     """Raises MechanismError unless the force is three and three components at a point of one of `bodies`."""
     if not isinstance(force.body, str) or force.body not in bodies:
-        raise unknown_body("a force on the unknown body", force.body, bodies)
+        raise unknown_body(f"there is a force on the unknown body {force.body!r:.80}", force.body, bodies)
     where = f"the force on body {force.body!r}"
     vector(f"{where}: at", force.at)
     if force.frame not in FRAMES:

@@ -289,7 +289,7 @@ def check_any_force(force: AnyForce, carried: Collection[str], bodies: Sequence[
 def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
     named = {body.name: body for body in bodies}
     if not isinstance(force.body, str) or force.body not in named:
-        raise unknown_body("a force on the joint of the unknown body", force.body, named)
+        raise unknown_body(f"there is a force on the joint of the unknown body {force.body!r:.80}", force.body, named)
     body = named[force.body]
     if body.joint.kind in COMPOSITIONS:
         force._require_axis(body)

@@ -291,7 +291,7 @@ class Mechanism(Structure):
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
         if not isinstance(body, str) or body not in self.carriers:
-            raise unknown_body("no body", body, self.carriers)
+            raise unknown_body(f"there is no body {body!r:.80} in the mechanism", body, self.carriers)
         return self._chain(body, self.system.q, self.system.qd)
 
     def joint_positions(self, q: ArrayLike) -> Array:

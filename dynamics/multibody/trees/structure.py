@@ -196,7 +196,7 @@ def descendants(bodies: Iterable[Body], root: str) -> set[str]:
     bodies = list(bodies)
     names = {body.name for body in bodies}
     if not isinstance(root, str) or root not in names:
-        raise unknown_body("no body", root, names)
+        raise unknown_body(f"there is no body {root!r:.80} in the mechanism", root, names)
     children: dict[str, list[str]] = {}
     for body in bodies:
         children.setdefault(body.parent, []).append(body.name)
