@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph._shared import Array, check_name, is_finite, or_nearest
+from cgraph._shared import Array, check_name, is_finite, nearest, or_nearest
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS, TYPES, JointType
@@ -308,8 +308,9 @@ def _pitch(where: str, joint: Joint) -> float:
 
 
 def unknown_body(sentence: str, name: object, known: Iterable[str]) -> MechanismError:
-    """The error of a name that is no body's: the sentence, and the names that are near."""
-    return MechanismError(f"{sentence}; {or_nearest(str(name), [*known])}")
+    """The error of a name that is no body's: the sentence, and names that are near, if any are."""
+    near = nearest(str(name), known)
+    return MechanismError(f"{sentence}; {or_nearest(str(name), near)}" if near else sentence)
 
 
 def checked_name(what: str, name: str, *, spaces: bool = True) -> None:
