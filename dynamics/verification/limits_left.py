@@ -26,7 +26,7 @@ def limits_left(run: Trajectory, limits: Mapping[str, Mapping[str, Pair]], units
     for part, (what, names, per) in enumerate((("position", run.coordinates, ""), ("velocity", run.velocities, "/s"))):
         for name, (lower, upper) in limits.get(what, {}).items():
             k, unit = names.index(name), units[name] + per
-            alike = [i for i, other in enumerate(names) if units[other] == units[name]]
+            alike = [i for i, other in enumerate(names) if units.get(other) == units[name]]
             sizes = np.abs([*states[part][:, alike].ravel(), *[x for x in (lower, upper) if np.isfinite(x)]])
             rounding = ROUNDING * sizes.max()
             if (left := _left(run, part, k, (lower, upper), t, states[part][:, k], rounding)) is not None:
