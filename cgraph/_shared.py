@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     )
     from .core.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
     from .core.label import SMOOTH as SMOOTH, UNLABELLED as UNLABELLED
-    from .core.scope import without_collection as without_collection
+    from .core.scope import formulating as formulating, without_collection as without_collection
     from .explain.lint.lint import Lint as Lint
     from .explain.reachability import descendants as descendants
     from .explain.why_nan import WhyNan as WhyNan

@@ -14,7 +14,7 @@ from .checks import check_name
 from .html_text import render_html
 from .label import INPUT, UNLABELLED, Interned, Label, SourceLine, label
 from .row import BY_UFUNC, ROWS, Row
-from .scope import current
+from .scope import current, formulating
 
 VARIABLE, CONSTANT = [Row(name, 0, float, float, lambda *_: ()) for name in ("variable", "constant")]
 
@@ -115,6 +115,15 @@ class Node:
 
     def __bool__(self) -> NoReturn:
         raise TypeError("a Node has no truth value before it is evaluated; choose by cg.where, or in data by cg.interp")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Node) and formulating.get() and isinstance(other, numbers.Real):
+            raise TypeError(
+                "a Node equals no number before it is evaluated; cg.equal compares values, cg.where chooses"
+            )
+        return True if self is other else NotImplemented
+
+    __hash__ = object.__hash__
 
     def __float__(self) -> float:
         if self.value is None:

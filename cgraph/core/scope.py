@@ -33,6 +33,10 @@ class Scope:
 current: ContextVar[Scope] = ContextVar("cgraph scope", default=Scope(WRITTEN, None))  # noqa: B039
 
 
+# Whether nodes are in the hands of somebody who may take them for numbers: then `node == 0` is an error.
+formulating: ContextVar[bool] = ContextVar("cgraph formula of a user", default=False)
+
+
 @contextmanager
 def tag(*tags: str) -> Iterator[None]:
     """Give every node made inside the `with` block these tags.

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents
 
-from ..systems.kinematics import ONE, ZERO, dot
+from ..systems.kinematics import ONE, dot
 from ..systems.system import System
 from .equation import Equation, Output
-from .substitute import substitute
 
 
 @Equation("q qd", Output("E", (), "J"))
@@ -24,12 +23,15 @@ def energy(system: System) -> Iterator[list[Node]]:
     >>> dyn.energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
     {'E': 4.0}
     """
-    yield [_legendre(system, system.lagrangian)]
+    build = Builder()
+    momenta = cotangents({system.lagrangian: ONE}, system.qd, build)
+    with building(build):
+        yield [dot(momenta, system.qd) - system.lagrangian]
 
 
 @Equation("q qd", Output("K", (), "J"))
 def kinetic_energy(system: System) -> Iterator[list[Node]]:
-    """The part K of the energy that motion adds, K = E - P; of bodies and springs the usual one.
+    """The kinetic energy K: terms of L tagged "kinetic"; without tags what motion adds to the energy, K = E - P.
 
     Examples
     --------
@@ -38,18 +40,12 @@ def kinetic_energy(system: System) -> Iterator[list[Node]]:
     >>> dyn.kinetic_energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
     {'K': 2.0}
     """
-    if system.body_terms is not None:
-        yield [system.kinetic]
-        return
-    motion = _legendre(system, system.kinetic)
-    with building(Builder()):  # of the terms T of L that depend on qd; where they are quadratic, T itself
-        total = motion + _at_rest(system)
-    yield [total]
+    yield [system.energies.kinetic]
 
 
 @Equation("q qd", Output("P", (), "J"))
 def potential_energy(system: System) -> Iterator[list[Node]]:
-    """The energy at rest, P = -L at qd = 0: that of gravity and springs.
+    """The potential energy P: terms of L tagged "potential"; without tags the energy at rest, P = -L at qd = 0.
 
     Returns
     -------
@@ -62,20 +58,4 @@ def potential_energy(system: System) -> Iterator[list[Node]]:
     >>> dyn.potential_energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
     {'P': 2.0}
     """
-    with building(Builder()):
-        at_rest = system.potential - _at_rest(system)
-    yield [at_rest]
-
-
-def _legendre(system: System, lagrangian: Node) -> Node:
-    """qd . dL/dqd - L."""
-    build = Builder()
-    momenta = cotangents({lagrangian: ONE}, system.qd, build)
-    with building(build):
-        return dot(momenta, system.qd) - lagrangian
-
-
-def _at_rest(system: System) -> Node:
-    """T(qd = 0), which is 0 of bodies."""
-    (node,) = substitute([system.kinetic], dict.fromkeys(system.qd, ZERO))
-    return node
+    yield [system.energies.potential]

@@ -4,6 +4,8 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 
+from cgraph._shared import or_nearest
+
 WIDTH = 120  # characters of a terminal
 GAPS = ("  ", " ")  # between columns: the second where the first is too wide
 
@@ -58,4 +60,4 @@ def check_names(*choices: tuple[str, Iterable[str], Iterable[str]]) -> None:
     """Raise ValueError for a name that is not known; choices: of (what they name, names, those known)."""
     for what, names, known in choices:
         if unknown := [name for name in names if name not in known]:
-            raise ValueError(f"there is no {what} {unknown[0]!r}; there are {', '.join(known)}")
+            raise ValueError(f"there is no {what} {unknown[0]!r}; {or_nearest(unknown[0], [*known])}")

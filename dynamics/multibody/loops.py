@@ -17,7 +17,7 @@ from ..equations.constraints.nearly_redundant_rows import without_nearly_redunda
 from ..systems.constraints import Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple
-from .bodies.body import WORLD, Body, MechanismError, checked_name, checked_rotation, vector
+from .bodies.body import WORLD, Body, MechanismError, checked_name, checked_rotation, unknown_body, vector
 from .joints import COMPOSITIONS
 from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier
@@ -197,7 +197,7 @@ def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
         raise MechanismError(f"loop {loop.label!r}: only a coupling has several bodies at one end")
     for name in loop.bodies:
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
-            raise MechanismError(f"there is a loop on the unknown body {name!r:.80}")
+            raise unknown_body(f"there is a loop on the unknown body {name!r:.80}", name, bodies)
     checked_name("a loop", loop.label if isinstance(loop.name, str) else loop.name)
     where = f"loop {loop.label!r}"
     for what in ("at", "to_at"):

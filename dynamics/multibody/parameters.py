@@ -50,7 +50,7 @@ def symbol(value: Quantity) -> float | Node:
 
 def vanishes(value: object) -> bool:
     """Whether the quantities are zero whatever the parameters are."""
-    return all([each == 0.0 for each in entries(value)])  # a node equals itself alone
+    return all([not isinstance(each, Node) and each == 0.0 for each in entries(value)])
 
 
 def bound(value: object, values: Mapping[str, float]) -> Any:

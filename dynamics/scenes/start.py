@@ -99,15 +99,16 @@ def start(model: Model, key: str | int) -> tuple[Array, Array]:
     return np.array(scene.q), np.array(scene.qd)
 
 
-def moving_start(scene: Scene) -> Scene:
+def moving_start(scene: Known, *, free: bool = True) -> Known:
     """The scene; where it would rest at its start for ever, from a start that shows something.
 
     That is half a radian from there at every joint, of many joints half a turn in all, or half a unit of coordinates
     without one, or such a velocity. Where its start has no rates, such as a center that attracts, it moves past it.
+    free: whether nothing drives it; if something does, only a start without rates is another.
     """
-    if any(scene.qd):
-        return scene
     rate = state_equation(scene)
+    if np.isfinite(_rates(rate, scene)) and (any(scene.qd) or not free):
+        return scene
     starts = [scene, *_nearby(scene)]
     found = [_rates(rate, each) for each in starts]
     if not np.isfinite(found[0]):
@@ -146,7 +147,7 @@ def _meant(scene: Scene) -> dict[str, int]:
     return meant | {f"q{i}": i for i in range(nq)} | {f"qd{i}": nq + i for i in range(len(scene.qd))}
 
 
-def _nearby(scene: Scene) -> list[Scene]:
+def _nearby(scene: Known) -> list[Known]:
     """The scene a little away from its start, at rest and then moving; only from what can be reached."""
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
     step = min(AWAY, IN_ALL / len(scene.q))

@@ -164,17 +164,17 @@ def _errors(first: Array, measured: Array, beside: RunsBeside) -> Array:
 
 
 class _Rows:
-    """States (T, m) of a run that starts with x, at instants t (T,)."""
+    """States (T, m) of a run that starts with x, at instants t (T,) after t0, with steps of at least `shortest` [s]."""
 
-    def __init__(self, t: Array, x: Array) -> None:
-        self.x, self._forth = np.full((len(t), len(x)), math.nan), np.sign(t[-1] - t[0])
+    def __init__(self, t: Array, x: Array, shortest: float, t0: float = 0.0) -> None:
+        self.x, self._forth, self._t0 = np.full((len(t), len(x)), math.nan), np.sign(t[-1] - t[0]), t0
         self.x[0], self.count = x, 1  # of the instants that it has come to
-        near = SAME_INSTANT * np.spacing(np.abs(t).max()) + ALIKE * np.abs(np.diff(t)).min()
-        self._times = self._forth * t - near  # for those at which steps end
+        near = SAME_INSTANT * np.spacing(np.abs(t + t0).max()) + ALIKE * np.abs(np.diff(t)).min()
+        self._times = self._forth * t - min(near, 0.5 * shortest)  # for those at which steps end
 
     def keep(self, block: StepBlock) -> None:
         """The next steps."""
-        ends = self._forth * block.t
+        ends = self._forth * (block.t - self._t0)
         here = slice(self.count, int(np.searchsorted(self._times, ends[-1], side="right")))
         self.x[here] = block.x[np.searchsorted(ends, self._times[here])]
         self.count = max(self.count, here.stop)
@@ -189,8 +189,13 @@ class RunEstimate:
         resetting = run.events is not None and any([event.reset is not None for event in run.events.events])
         if isinstance(run, EqualStepper) and run.options.estimated and run.control is None and not resetting:
             begin = time.perf_counter()
-            self._beside = runs_beside(equal_steps(span.instants, run.options.step), run.program.order)
-            self._rows = _Rows(self._beside.t, x)
+            t0 = 0.0
+            if not any([node.name == TIME for node in run.program.rate.nodes]):  # the clock, which rounds, is no part
+                t0, times = span.t0, None if span.times is None else span.times - span.t0
+                self._span = Span(span.t_end - t0, t_eval=times)
+            self._beside = runs_beside(equal_steps(self._span.instants, run.options.step), run.program.order)
+            self._shortest = 0.5 * self._beside.longest
+            self._rows = _Rows(self._beside.t, x, self._shortest, t0)
             self._watch = Watch(run.program.rate, np.array([run.parameters]), span.t0, x[None])
             self.seconds = time.perf_counter() - begin
 
@@ -210,7 +215,7 @@ class RunEstimate:
         assert isinstance(run, EqualStepper)
         rows = [self._rows.x[None, :count]]
         for stretches, _ in beside.runs:
-            other = _Rows(beside.t[:count], self._x)
+            other = _Rows(beside.t[:count], self._x, self._shortest)
             for block in run.beside(stretches).blocks(self._x * ASIDE, self._span):
                 other.keep(block)
                 if other.count == count:

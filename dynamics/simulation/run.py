@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Array, HoldsNodes, floats, kept_by_first
+from cgraph._shared import Array, HoldsNodes, floats, kept_by_first, real_number
 
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import initial_values, other_inputs, start_state
@@ -281,7 +281,7 @@ class Run(HoldsNodes):
         run = self._bound(parameters)
         if not run._is_of_steps_alone:
             raise ValueError("single steps are of motions without events, sampled controllers, momenta and max_steps")
-        p, span = run._open_values(parameters), Span(t0 + 1.0 if t_end is None else t_end, t0=t0)
+        p, span = run._open_values(parameters), Span(real_number("t0", t0) + 1.0 if t_end is None else t_end, t0=t0)
         x = run._start(q, qd, span, p)
         return MotionSteps(stepper_of(run._equations.stepped, run._options, p, dense=False), x, span.t0, t_end)
 

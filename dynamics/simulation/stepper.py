@@ -627,7 +627,7 @@ class ChosenStepper(Stepper):
                 slope = f"the derivative of the rate of {names[row]} by {by[column]} is not finite"
                 return f"{where}{slope}; method {self.options.method!r} takes it, method='dop853' takes none"
         if reason := nonfinite(self.program.components, self.runner.read(self._memory, "x_new")):
-            return f"{where}{reason}, however small"
+            return f"{where}{reason}, and after all shorter ones, however small"
         scale = self.runner.read(self._memory, TOLERANCE) + self._relative * np.abs(x)
         fastest = self.program.components[int(np.argmax(np.abs(rate) / scale))]
         h = self._number("tried")

@@ -10,10 +10,18 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import check_name, is_finite, or_nearest, real_number, require_mapping
+from cgraph._shared import check_name, formulating, is_finite, or_nearest, real_number, require_mapping
 from cgraph.extend import topological
 
 TIME = "t"
+ONCE = "the function is called once, with nodes, of which it makes a formula"
+HINTS = {
+    r"for \^": "a power is written **, as in qd[0]**2",
+    r"numbers, got Node|BoundFunction|not 'Node'|not Node|<node": ONCE,
+    r"'Parameters' object": "a parameter is taken by its name, as in p['m']",
+    r"'Node'|Node\.|\"Node\"": "t and each entry of q and qd is a node, which cg.sin, cg.where, .. and + - * / ** take",
+    r"'list'|list ind|non-int": "coordinates, velocities and states are lists in the order of their names, as q[0]",
+}  # what is right, by what Python says where nodes are taken for something else
 _RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt")
 
 
@@ -25,14 +33,14 @@ class Parameters(dict[str, Node]):
 
     def __missing__(self, name: str) -> NoReturn:
         raise ValueError(
-            f"the system has no parameter {name!r} ({or_nearest(name, list(self))}); give it to `parameters`"
+            f"the system has no parameter {name!r} ({or_nearest(str(name), list(self))}); give it to `parameters`"
         )
 
 
 def names_of(what: str, kind: str, names: Sequence[str] | str, *, spaces: bool = True) -> tuple[str, ...]:
     """Names of that kind, from a sequence or one string with spaces between. Raises TypeError or ValueError."""
     if isinstance(names, str):
-        names = names.split()
+        names = names.replace(",", " ").split()
     kinds = f"{kind[:-1]}ies" if kind.endswith("y") else f"{kind}s"
     names = sequence(f"{kinds} must be", names)
     if not names:
@@ -114,8 +122,31 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
     for chosen, last in ((arguments, "p"), (arguments[:-1], "t")):
         if _takes(function, len(chosen)) and not _keeps(function, len(chosen) - 1, last):
-            return function(*chosen)
-    raise TypeError(f"{what} must take {names}, got {inspect.signature(function)}")
+            break
+    else:
+        raise TypeError(f"{what} must take {names}, got {inspect.signature(function)}")
+    _require_order(what, function, names)
+    token = formulating.set(True)
+    try:
+        return function(*chosen)
+    except (TypeError, AttributeError, IndexError, KeyError) as error:  # of Python, on nodes or a list of them
+        hint = next((hint for pattern, hint in HINTS.items() if re.search(pattern, str(error))), None)
+        if hint is None:
+            raise
+        hint += "; what needs numbers is a SampledController" if hint is ONCE and "controller" in what else ""
+        raise TypeError(f"{what}: {hint} ({error})") from error
+    finally:
+        formulating.reset(token)
+
+
+def _require_order(what: str, function: Callable[..., object], names: str) -> None:
+    """Raises TypeError for arguments of these names in other places, such as (t, x) or, of constraints, (q, qd, t)."""
+    right = names.rpartition("(")[2].rstrip(")").split(", ")
+    given = [*inspect.signature(function).parameters][: len(right)]
+    wrong = [name for name, place in zip(given, right, strict=False) if name in {*right, "qd"} - {place}]
+    if [name for name in wrong if name != "p" or given.index("p") == right.index("t")]:
+        more = "; conditions on velocities belong to velocity_constraints=" if what == "constraints" else ""
+        raise TypeError(f"{what} must take {names}, in this order, got ({', '.join(given)}){more}")
 
 
 def _takes(function: Callable[..., object], count: int) -> bool:
@@ -153,11 +184,14 @@ def require_known(what: str, nodes: Iterable[Node], known: Collection[Node], oth
 
 
 def sequence(what: str, value: Any) -> list[Any]:
-    """The values as a list. Raises TypeError, "<what> a sequence ...", for what is none."""
+    """The values as a list. Raises TypeError, "<what> a sequence ...", for what is none, a text and a mapping."""
     try:
-        return list(value)
+        if not isinstance(value, str | Mapping):
+            return list(value)
     except TypeError:
-        raise TypeError(f"{what} a sequence, got {type(value).__name__}: {value!r:.60}") from None
+        pass
+    more = "; is `return` missing?" if value is None and "give" in what else ""
+    raise TypeError(f"{what} a sequence, got {type(value).__name__}: {value!r:.60}{more}")
 
 
 def one_for_each(what: str, given: object, names: Sequence[str], of: str) -> list[Node]:
@@ -171,6 +205,8 @@ def one_for_each(what: str, given: object, names: Sequence[str], of: str) -> lis
 def node_or_number(what: str, value: Any) -> Node:
     """The node, or the constant of a number. Raises TypeError or ValueError, naming `what`, for anything else."""
     try:
+        if isinstance(value, bool):
+            raise TypeError(f"{value} is a comparison by Python; cg.equal, cg.where, < and > compare nodes")
         return value if isinstance(value, Node) else cg.constant(value)
     except (TypeError, ValueError) as error:
         raise type(error)(f"{what} must be a node or a number: {error}") from None

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from cgraph import Node
-from cgraph._shared import check_name
+from cgraph._shared import check_name, shortened
 from cgraph.extend import Builder, cotangents, topological
 
 from .arguments import Parameters, call_user_function, node_or_number, sequence
@@ -107,6 +107,16 @@ class Constraints:
         other.positions, other.velocities, other.whole = tuple(rows[:count]), tuple(rows[count:]), self
         other.left_out = dropped
         return other
+
+    def require_slopes(self) -> None:
+        """Raises ValueError for a row that no velocity can change, whatever the state: it would hold nothing."""
+        for i, (name, row) in enumerate(zip(self.names, self.rates, strict=True)):
+            if any([slope.value != 0.0 for slope in shortened(cotangents({row: ONE}, self.kinematics.u, Builder()))]):
+                continue
+            if i < len(self.positions):
+                raise ValueError(f"constraint {name!r} is the same at all coordinates, so it holds nothing")
+            where = "a condition on positions belongs to constraints="
+            raise ValueError(f"velocity constraint {name!r} has no velocity in it; {where}")
 
     def _check(self) -> None:
         u = set(self.kinematics.u)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -28,6 +28,7 @@ from .arguments import (
 )
 from .body_terms import BodyTerms
 from .constraints import Constraints
+from .energies import Energies, added, energies, split_by_motion
 from .kinematics import Kinematics
 from .quasi_velocities import QuasiVelocities
 
@@ -127,6 +128,8 @@ class System(HoldsNodes):
         require_known("damping", damped, p.values(), f"no parameter (it has {', '.join(p) or 'none'})")
         self.constraints = Constraints(self.kinematics, self.t, self.parameters, constraints, velocity_constraints)
         self.require_known("the system", self._given, p)
+        if body_terms is None:  # rows of loops may be 0, such as those across a plane
+            self.constraints.require_slopes()
 
     def require_known(self, what: str, nodes: Sequence[Node], parameters: Mapping[str, Node]) -> None:
         """Raises ValueError for a variable that is neither of the state, nor t, nor one of these parameters."""
@@ -207,21 +210,25 @@ class System(HoldsNodes):
     @cached_property
     def lagrangian(self) -> Node:
         """L, the sum of the partial Lagrangians (the paper, section 4.3)."""
-        return _sum(self.partial_lagrangians)
+        return added([(1, partial) for partial in self.partial_lagrangians])
 
     @cached_property
+    def energies(self) -> Energies:
+        """The kinetic and the potential energy in L."""
+        if self.body_terms is None:
+            return energies(self.lagrangian, self.qd)
+        kinetic, potential = split_by_motion(self.lagrangian, self.qd)
+        return Energies(kinetic, potential, kinetic, "the kinetic energy of the bodies")
+
+    @property
     def kinetic(self) -> Node:
-        """K: the terms of L that depend on the velocities."""
-        return self._split[0]
+        """L + P: the kinetic energy, and terms of L that are in neither energy, such as those linear in velocities."""
+        return self.energies.without_potential
 
-    @cached_property
+    @property
     def potential(self) -> Node:
-        """P: the terms of L that do not depend on the velocities, with their sign turned; L = K - P."""
-        return self._split[1]
-
-    @cached_property
-    def _split(self) -> tuple[Node, Node]:
-        return _kinetic_and_potential(self.lagrangian, self.qd)
+        """P, the potential energy: L = kinetic - potential."""
+        return self.energies.potential
 
     @cached_property
     def shortened(self) -> System | None:
@@ -229,10 +236,9 @@ class System(HoldsNodes):
 
         P, whose sums could lose digits that a product of differences keeps, only where it then depends on less.
         """
-        kinetic, potential, forces = (
-            _shared.shortened(part) for part in ([self.kinetic], [self.potential], self.forces)
-        )
-        if [*kinetic, *potential, *forces] == [self.kinetic, self.potential, *self.forces]:
+        moving, still = split_by_motion(self.lagrangian, self.qd)
+        kinetic, potential, forces = (_shared.shortened(part) for part in ([moving], [still], self.forces))
+        if [*kinetic, *potential, *forces] == [moving, still, *self.forces]:
             return None
         given = {"partial_lagrangians": (kinetic[0], -potential[0]), "forces": tuple(forces)}
         return self.changed(**given, extra_inputs=self.extra_inputs, shortened=None)
@@ -286,36 +292,3 @@ def generalized_forces(what: str, function: Callable[..., object], system: Syste
     """Forces of a function of (q, qd, t) or (q, qd, t, p), a node for each velocity. Raises what is wrong with it."""
     given = call_user_function(what, function, system.q, system.qd, system.t, p)
     return one_for_each(what, given, system.velocities, "the force on")
-
-
-def _kinetic_and_potential(lagrangian: Node, velocities: Sequence[Node]) -> tuple[Node, Node]:
-    """Sums of the terms of L with velocities and, their sign turned, without: sums are taken apart until that is so."""
-    moving = set(velocities)
-    for node in topological([lagrangian]):
-        if any(arg in moving for arg in node.args):
-            moving.add(node)
-    terms = list(signed_terms(lagrangian, moving))
-    kinetic = [node if sign > 0 else -node for sign, node in terms if node in moving]
-    return _sum(kinetic), _sum([node if sign < 0 else -node for sign, node in terms if node not in moving])
-
-
-def signed_terms(total: Node, among: Collection[Node] | None = None) -> Iterator[tuple[int, Node]]:
-    """The terms of a sum with their signs, in their order.  among: nodes that are taken apart, by default all."""
-    stack = [(1, total)]
-    while stack:
-        sign, node = stack.pop()
-        parts = among is None or node in among
-        if parts and node.op.name in ("add", "sub"):
-            a, b = node.args
-            stack += [(-sign if node.op.name == "sub" else sign, b), (sign, a)]
-        elif parts and node.op.name == "neg":
-            stack.append((-sign, node.args[0]))
-        else:
-            yield sign, node
-
-
-def _sum(nodes: Sequence[Node]) -> Node:
-    total: Node | None = None
-    for node in nodes:
-        total = node if total is None else total + node
-    return cg.constant(0.0) if total is None else total

@@ -26,16 +26,20 @@ def limits_left(run: Trajectory, limits: Mapping[str, Mapping[str, Pair]], units
     for part, (what, names, per) in enumerate((("position", run.coordinates, ""), ("velocity", run.velocities, "/s"))):
         for name, (lower, upper) in limits.get(what, {}).items():
             k, unit = names.index(name), units[name] + per
-            if (left := _left(run, part, k, (lower, upper), t, states[part][:, k])) is not None:
+            alike = [i for i, other in enumerate(names) if units.get(other) == units[name]]
+            sizes = np.abs([*states[part][:, alike].ravel(), *[x for x in (lower, upper) if np.isfinite(x)]])
+            rounding = ROUNDING * sizes.max()
+            if (left := _left(run, part, k, (lower, upper), t, states[part][:, k], rounding)) is not None:
                 first, value, at = left
                 bounds = f"{what} of {name} leaves {lower:.6g} to {upper:.6g} {unit} at {first:.4g} s"
                 said.append(f"{bounds}, and is {value:.6g} {unit} at {at:.4g} s")
     return said
 
 
-def _left(run: Trajectory, part: int, k: int, ends: Pair, t: Array, x: Array) -> tuple[float, float, float] | None:
+def _left(
+    run: Trajectory, part: int, k: int, ends: Pair, t: Array, x: Array, rounding: float
+) -> tuple[float, float, float] | None:
     """When a coordinate with values x at instants t is beyond its limit first, where it is farthest, and when."""
-    rounding = ROUNDING * np.abs(x).max()
 
     def beyond(x: Array) -> Array:
         return np.asarray(np.maximum(ends[0] - x, x - ends[1]) - rounding)

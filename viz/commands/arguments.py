@@ -325,7 +325,7 @@ def started(options: argparse.Namespace, *, free: bool = True) -> tuple[dyn.scen
     scene = scene_of(options)
     if options.start is not None:
         return library.with_start(scene, options.start), ""
-    moving = library.moving_start(scene) if free else scene
+    moving = library.moving_start(scene, free=free)
     if moving is scene:
         return scene, ""
     why = library.rest_text(scene, moving)

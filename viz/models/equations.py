@@ -264,6 +264,7 @@ def _spurious(scene: Scene, formulation: str) -> list[Block]:
         held.insert(0, (variable("tau_def") - variable("tau"), variable("G") ** TRANSPOSED * slope if quasi else slope))
     about = (
         f"What the torque {had}, τ_def, has too much, however small the time step dt is: q = q̇ dt + q_old makes the "
-        "momentum depend on q̇ through q as well. A further part, dt times the rate of this one, tends to 0 with dt."
-    )
+        "momentum depend on q̇ through q as well. A further part, dt times the rate of this one, tends to 0 with dt. "
+        f"{verdict.taken}"
+    ).strip()
     return [Block(f"Spurious term, {formulation.replace('_', ' ')}", held, about, wrong=True)]

@@ -105,7 +105,7 @@ def animate(
     known = _motions(model, motions)
     wrong = _shared.require_sequence("marked", marked, "words of motions", str)
     if unknown := [each for each in wrong if each not in known]:
-        raise ValueError(f"marked: there is no motion {unknown[0]!r:.80} (there are {', '.join(known)})")
+        raise ValueError(f"marked: there is no motion {unknown[0]!r:.80} ({_shared.or_nearest(unknown[0], [*known])})")
     times = _times(known.values(), speed)
     panel = _panel(model, known, times, wanted, set(wrong))
     made = Animation(film(panel, times, _shared.require_flag("dark", dark), title))
@@ -156,6 +156,8 @@ def _times(motions: Collection[Trajectory], speed: float) -> Array:
 
 def frames(length: float, speed: float) -> int:
     """Number of frames of a film of some seconds. Raises ValueError for fewer than 2, or too many."""
+    if length == 0.0:
+        raise ValueError("the motion ends where it starts, so there is nothing to film: pass --t-end or --start")
     count = length * RATE / speed
     if not 1.0 <= count < MOST_FRAMES:
         raise ValueError(

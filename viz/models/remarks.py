@@ -1,6 +1,7 @@
 """A sentence on a model: that inverse dynamics is that of its tree."""
 
 from dynamics import scenes
+from dynamics.equations.constraints.constraint_rank import independent_rows
 
 SHOWN = 4  # names; more are counted
 
@@ -10,6 +11,8 @@ def tree_alone(scene: scenes.Scene) -> str:
     if scene.ode is not None:
         return ""
     loops = scene.mechanism.loops if scene.mechanism is not None else ()
+    if not loops:
+        independent_rows(scene.system.constraints)  # raises for a condition that holds nothing
     held = list(dict.fromkeys([loop.label for loop in loops])) or list(scene.system.constraints.names)
     if not held:
         return ""

@@ -35,14 +35,14 @@ function embedded(system, energyOf, through) {
   return { inputs: [...qOld, ...qdOld, ...qdd, dt], q: qNew, qd: qdNew, rate, gradient };
 }
 /** What is differentiated by qd through q = qd dt + q_old, by the formulations that do that. */
-const THROUGH_STEP = { by_definition: ({ lagrangian }) => lagrangian, kinetic_only: (system) => kineticEnergy(system) };
+const THROUGH_STEP = { by_definition: ({ lagrangian }) => lagrangian, kinetic_only: (system) => withoutPotential(system) };
 const FORMULATIONS = ["by_definition", "kinetic_only", "chain_rule"];
 
-/** K: the terms of L that depend on velocities. */
-function kineticEnergy({ lagrangian, qd }) {
-  const moving = new Set(qd);
+/** L + P as the library has it: T, and what of V depends on velocities; of an L alone P is the energy at rest. */
+function withoutPotential({ lagrangian, kinetic, qd }) {
+  const moving = new Set(qd), stack = [[1, lagrangian]], terms = [];
   for (const node of topological([lagrangian])) if (node.args.some((arg) => moving.has(arg))) moving.add(node);
-  const stack = [[1, lagrangian]], terms = [];
+  if (kinetic) return moving.has(lagrangian.args[1]) && kinetic !== lagrangian ? lagrangian : kinetic;
   while (stack.length) {
     const [sign, node] = stack.pop();
     if (!moving.has(node)) continue;
@@ -50,7 +50,14 @@ function kineticEnergy({ lagrangian, qd }) {
     else if (node.op === "neg") stack.push([-sign, node.args[0]]);
     else terms.push(sign > 0 ? node : neg(node));
   }
-  return terms.reduce((sum, term) => add(sum, term));
+  const build = new Builder(), whole = terms.reduce((sum, term) => add(sum, term)), [energy] = folded([whole], build);
+  const slopes = cotangents(new Map([[energy, ONE()]]), qd, build);
+  const [rest, ...linear] = folded([energy, ...slopes], build, pairs(qd, qd.map(() => constant(0))));
+  if (rest.value === 0) return whole;
+  const masses = slopes.map((slope, i) => cotangents(new Map([[slope, ONE()]]), qd.slice(0, i + 1), build));
+  const quadratic = !topological(masses.flat()).some((node) => qd.includes(node)) && linear.every(({ value }) => value === 0);
+  return within({ build }, () => (quadratic ? masses.flatMap((row, i) => row.map((mass, j) => mul(mass, i === j ? mul(mul(0.5, qd[i]), qd[i]) : mul(qd[i], qd[j]))))
+    .reduce((sum, term) => add(sum, term)) : sub(energy, rest)));
 }
 
 /** tau = d/dt dL/dqd - dL/dq + damping qd - forces, simplified. */

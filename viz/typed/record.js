@@ -77,9 +77,9 @@ function stageOf({ label }) {
 }
 function aboutOf({ nodes }, found) {
   if (!found) return `Accelerations from torques: the mass matrix is derived and eliminated, ${nodes.length} nodes.`;
-  const { differs, nodes: wrong, edges, sentence, why, lacking } = found;
-  if (!differs) return `${sentence} Nothing else drives the joints here: the torques should be 0.`;
-  return [sentence, why, ...(edges.length ? [`${spuriousText(nodes.length, wrong.size, edges.length)}.`] : []), lacking].filter(Boolean).join(" ");
+  const { differs, nodes: wrong, edges, sentence, why, lacking, taken } = found;
+  if (!differs) return `${[sentence, ...taken].join(" ")} Nothing else drives the joints here: the torques should be 0.`;
+  return [sentence, why, ...(edges.length ? [`${spuriousText(nodes.length, wrong.size, edges.length)}.`] : []), lacking, ...taken].filter(Boolean).join(" ");
 }
 function noticesOf(system, motion) {
   if (motion.error) return [motion.error];

@@ -137,7 +137,7 @@ class Meaning {
     const lagrangian = this.lagrangian();
     const result = {
       coordinates: this.coordinates, q: this.q, qd: this.qd, qdd: this.qdd, tau: this.tau, t: this.t,
-      parameters: this.parameters, lagrangian, start: this.start(), points: this.points(),
+      parameters: this.parameters, lagrangian, kinetic: this.defined.has("L") ? null : asNode(this.node(this.defined.get("T"))), start: this.start(), points: this.points(),
       damping: this.perCoordinate("damping"), forces: this.perCoordinate("tau").map(asNode),
     };
     this.defined.forEach((each) => this.node(each)); // also what nothing uses must have a meaning

@@ -9,8 +9,9 @@ const STEP = "q = qd dt + q_old";
  * It is the torque of the chain rule if and only if c is 0 at every state. Words are those of the library's verdict.py. */
 function verdict(system, formulation) {
   const graph = inverseDynamics(system, formulation), energy = ENERGIES[formulation], slope = `d${energy}/dq`, begin = `${HOW[formulation]}, the torque is`;
-  const alike = (reason) => ({ formulation, graph, energy: energy ?? "L", differs: false, sentence: `${begin} right: ${reason}.`, lines: [`${begin} right: ${reason}.`],
-    nodes: new Set(), edges: [], off: [], missing: [], why: "", lacking: "" });
+  const taken = energy === "K" ? [`K is ${system.kinetic ? "the line T" : "E - P, the energy less that at rest"}.`] : [];
+  const alike = (reason) => ({ formulation, graph, energy: energy ?? "L", differs: false, sentence: `${begin} right: ${reason}.`, lines: [`${begin} right: ${reason}.`, ...taken],
+    nodes: new Set(), edges: [], off: [], missing: [], why: "", lacking: "", taken });
   if (!energy) return alike("every derivative in it is taken at independent q and qd");
   const build = new Builder(), [from] = folded([THROUGH_STEP[formulation](system)], build);
   const c = folded(cotangents(new Map([[from, ONE()]]), system.q, build));
@@ -21,7 +22,7 @@ function verdict(system, formulation) {
   if (finite && !excess.length) return alike(`${slope} is 0 to rounding at all ${finite} states tried, though its form does not prove it`);
   if (!finite) {
     const sentence = `${begin} not shown to be right: ${slope} is finite at none of the ${STATES} states tried.`;
-    return { ...alike(""), differs: true, sentence, lines: [sentence] };
+    return { ...alike(""), differs: true, sentence, lines: [sentence, ...taken] };
   }
   const names = displayNames(system), { nodes, edges, cancelled, marked, through } = blame(system, formulation, graph);
   const [wrong, right] = [1, 0].map((factor) => torquesAt(marked, new Map([...at, ["dt", 0], [through.name, factor]])));
@@ -38,9 +39,9 @@ function verdict(system, formulation) {
     + `which cancels the -${slope} of Lagrange's equation.`;
   const terms = off.length > 1 ? `${shortList(called, NAMED)} are off, each by its ${slope}` : `${called[0]} is off by ${slope}.${system.coordinates[excess[0][0]]}`;
   const lines = [`${begin} wrong at every dt, however small. At ${where}:`, ...values, why,
-    ...(edges.length ? [`${spuriousText(graph.nodes.length, nodes.size, edges.length)}.`] : []), ...(lacking ? [lacking] : [])];
+    ...(edges.length ? [`${spuriousText(graph.nodes.length, nodes.size, edges.length)}.`] : []), ...(lacking ? [lacking] : []), ...taken];
   return { formulation, graph, energy, differs: true, sentence: `${begin} wrong at every dt, however small: ${terms}.`, lines, nodes, edges,
-    off, missing: missing.map(([i]) => `tau${i}`), why, lacking };
+    off, missing: missing.map(([i]) => `tau${i}`), why, lacking, taken };
 }
 
 const SHOWN = 6, NAMED = 3; // texts that a list shows, and names in a sentence

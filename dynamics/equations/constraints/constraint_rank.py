@@ -9,13 +9,14 @@ import numpy as np
 
 from cgraph._shared import Array, kept_by_first
 
-from ...systems.constraints import Constraints
+from ...systems.constraints import ConstraintError, Constraints
 from .row_numbers import row_numbers
 
 STATES = 8  # states that meet the constraints and whose rank is clear, at which rows are compared, at most
 DEPENDENT = 1e-9  # of the largest row of a loop, or of a row of no loop: one of the others if no more of it is left
 BETTER = 5.0  # times as much of it has to be new for a row to be kept in place of one before it
 CLEAR = 1e-5  # what is left of rows that are independent: less is also seen where a state is singular but for rounding
+SLOPED = 1e-3  # of the slopes about a state: a row whose slopes are less wherever it is met has none there
 
 
 class ConstraintWarning(UserWarning):
@@ -43,19 +44,22 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     Of rows that could stand for one another those are kept of which most is new at the worst state, the first ones
     where there is no great difference. Near a state of less rank, known to a rounding e, rows are off by sqrt(e): such
     states count only if no others are seen. Warns of that, and of rows that are left out.
-    Raises ConstraintError where no state is seen that meets all.
+    Raises ConstraintError where no state is seen that meets all, and for a row of no loop that has no slope where it is
+    met, such as a square.
     """
     if not len(constraints):
         return ()
     numbers = row_numbers(constraints)
     clear: dict[int, list[Array]] = {}  # by rank
     doubtful: list[dict[int, float]] = []
-    acting = np.zeros(len(constraints), dtype=bool)
+    acting, sizes = np.zeros(len(constraints), dtype=bool), np.zeros(len(constraints))
     for point in numbers.states():
         matrix = numbers.certain_matrix(point)
         acting |= matrix.any(axis=1)
         rows, columns = numbers.scales(point)
         matrix = rows[:, None] * matrix * columns
+        size = np.linalg.norm(matrix, axis=1)  # or less than the rounding of the state makes of it
+        sizes = np.maximum(sizes, np.where(rows * numbers.gap_rounding(point) < SLOPED * size, size, 0.0))
         shares = _independent([matrix])
         if min(shares.values(), default=1.0) < CLEAR:
             doubtful.append(shares)
@@ -64,6 +68,10 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
         most = np.count_nonzero(numbers.typical(point, numbers.reach).any(axis=1))
         if sum(map(len, clear.values())) == STATES or len(shares) == most:
             break
+    for name, size in zip(constraints.names, sizes, strict=True):
+        if size < SLOPED and name not in constraints.loop_rows and constraints.whole is None:
+            text = "wherever it is met its slopes are 0, too, as those of a square are: write the condition itself"
+            raise ConstraintError(f"constraint {name!r} cannot hold the motion: {text}")
     kept = max(doubtful, key=len, default={})
     if clear:
         rank = max(clear)

@@ -207,6 +207,15 @@ class RowNumbers:
         """phi."""
         return np.zeros(0) if self.phi is None else np.array(_numbers(self.phi, point))
 
+    def gap_rounding(self, point: Mapping[str, float]) -> Array:
+        """What rounding of the state, or on the way, can make of each row, (m,); 0 of rows of velocities."""
+        sizes = np.zeros(len(self.constraints))
+        if self.phi is not None:
+            roundoff = np.finfo(float).eps / 2.0
+            bounds = _shared.error_bounds(self.phi.nodes, point, roundoff, of_inputs=roundoff)[1]
+            sizes[: len(self.phi.outputs)] = [float(bounds[node]) for node in self.phi.outputs.values()]
+        return sizes
+
     def _open_rows(self, before: Mapping[str, float], step: Array, most: float = OPEN) -> Indices:
         """The rows of phi that are not 0 to their rounding, that of the step included, after a step."""
         if self.landed is None:

@@ -92,6 +92,8 @@ class Verdict:
         a formulation that takes no derivative through the step.
     asked : bool
         Whether `at` is a state that was asked for.
+    taken : str
+        Sentence on what K is; empty of a formulation that differentiates L.
 
     Examples
     --------
@@ -118,6 +120,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
     names: Mapping[str, str] = field(default_factory=dict)
     terms: Graph | None = None
     asked: bool = False
+    taken: str = ""
 
     @cached_property
     def off(self) -> Off:
@@ -165,7 +168,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
 
     def __str__(self) -> str:
         if not self.excess:
-            return self.summary
+            return f"{self.summary} {self.taken}".strip()
         called = Names(self.graph, self.names)
         texts = [f"{self.names.get(name, name)}={value:g}" for name, value in self.at.items()]
         where = _listed(texts, len(texts) if self.asked else SHOWN)
@@ -174,7 +177,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
             values = f"{each.torque:.6g}, by the chain rule {each.right:.6g}"
             lines.append(f"  {called.shown(name)} is {values}: off by {each}")
         lines += [f"  and {len(self.excess) - SHOWN} more"] if len(self.excess) > SHOWN else []
-        more = self.why, self._spurious(called) if self.edges else "", self.lacking
+        more = self.why, self._spurious(called) if self.edges else "", self.lacking, self.taken
         return "\n".join([*lines, *filter(None, more)])
 
     @property
@@ -220,7 +223,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
     def explanation(self) -> str:
         """Sentences that follow the summary: why it differs, and how much of the graph is spurious; else empty."""
         spurious = spurious_text(len(self.graph.nodes), len(self.nodes), len(self.edges))
-        return " ".join(filter(None, (self.why, f"{spurious}." if self.edges else "", self.lacking)))
+        return " ".join(filter(None, (self.why, f"{spurious}." if self.edges else "", self.lacking, self.taken)))
 
     def _spurious(self, called: Names) -> str:
         edges = [edge for edge in self.graph.edges if edge in self.edges]
@@ -282,19 +285,19 @@ def formulation_verdict(
     (True, 'qd.y')
     >>> print(dyn.formulation_verdict(dyn.scenes.load("spring_mass"), "kinetic_only"))
     Kinetic only, the torque is right: the mass matrix does not depend on q, dK/dq is 0, and the derivative through q \
-= qd dt + q_old adds nothing.
+= qd dt + q_old adds nothing. K is the terms of L tagged 'kinetic'.
     """
     system, names = as_system(model), display_names(model)
     formulation, given = formulation_name(formulation), numbers_of(at)
     graph = remarked(simplify(torques(system, formulation)), partial(remarks, model, formulation, torques))
+    taken = system.energies.taken if formulation.startswith("kinetic") else ""
     if formulation not in THROUGH_STEP:
-        return Verdict(
-            formulation, graph, reason="every derivative in it is taken at independent q and qd", names=names
-        )
+        reason = "every derivative in it is taken at independent q and qd"
+        return Verdict(formulation, graph, reason=reason, names=names, taken=taken)
     terms, slope = _terms(system, formulation), f"d{ENERGIES[formulation]}/dq"
     if system.kinematics.quasi is not None:
         slope = f"G^T {slope}"
-    alike = Verdict(formulation, graph, names=names, terms=terms)
+    alike = Verdict(formulation, graph, names=names, terms=terms, taken=taken)
     if all([node.value == 0.0 for node in terms.outputs.values()]):
         free = "L does not depend on q" if formulation == "by_definition" else "the mass matrix does not depend on q"
         reason = f"{free}, {slope} is 0, and the derivative through {_step(slope)} adds nothing"

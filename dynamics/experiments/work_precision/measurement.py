@@ -42,7 +42,7 @@ class ErrorMetrics:
         self.energies: Graph | None = None
         if task.conservative:
             system, of_energy = as_system(task.model), energy(task.model)
-            self.energies = Graph(of_energy.inputs, of_energy.outputs | {"K": system.kinetic})
+            self.energies = Graph(of_energy.inputs, of_energy.outputs | {"K": system.energies.kinetic})
 
     def errors(self, rows: Array) -> Array:
         """The largest error of a state at each time, (T,), of rows (T, m); infinite where there is no number."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import scenes
-from ...scenes.start import Start, with_start
+from ...scenes.start import Start, moving_start, rest_text, with_start
 from ..accuracy_task import AccuracyTask
 from ..stability import cases
 from ..stability.cases.orbits import kepler
@@ -35,7 +35,7 @@ def load(
 ) -> AccuracyTask:
     """The task of that name: of `TASKS`, a scene, a case, or an MJCF or URDF file.
 
-    t_end [s], start: in place of its own.  reading: options of `dynamics.scenes.of_file`.
+    t_end [s], start: in place of its own, or of `moving_start`.  reading: options of `dynamics.scenes.of_file`.
     Raises ValueError for a name that is none of these, a horizon that is not positive, or a start of another length.
     """
     fixed = TASKS.get(name) or (partial(cases.load, name) if name in cases.names() else None)
@@ -52,7 +52,10 @@ def load(
         if not (math.isfinite(t_end) and t_end > 0.0):
             raise ValueError(f"t_end must be positive and finite, got {t_end!r} s")
         task = replace(task, t_end=float(t_end))
-    if start is not None:
+    if start is None and fixed is None:
+        moving = moving_start(task)
+        task = task if moving is task else replace(moving, about=f"{task.about}; {rest_text(task, moving)}")
+    elif start is not None:
         if fixed is not None:
             raise ValueError(f"{name!r} has a start of its own; scenes and files take others")
         task = with_start(task, start)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph._shared import Array, check_name, is_finite
+from cgraph._shared import Array, check_name, is_finite, nearest, or_nearest
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS, TYPES, JointType
@@ -311,6 +311,12 @@ def _pitch(where: str, joint: Joint) -> float:
         needs = f"only a screw has a pitch, not {kind!r}" if pitch else f"a joint of the kind {kind!r} needs a pitch"
         raise MechanismError(f"{where}: {needs}, got {pitch!r} m/rad")
     return float(pitch)
+
+
+def unknown_body(sentence: str, name: object, known: Iterable[str]) -> MechanismError:
+    """The error of a name that is no body's: the sentence, and names that are near, if any are."""
+    near = nearest(str(name), known)
+    return MechanismError(f"{sentence}; {or_nearest(str(name), near)}" if near else sentence)
 
 
 def checked_name(what: str, name: str, *, spaces: bool = True) -> None:

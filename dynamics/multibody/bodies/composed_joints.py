@@ -25,6 +25,7 @@ from .body import (
     checked_rotation,
     quantities,
     unit_axis,
+    unknown_body,
     vector,
 )
 
@@ -58,7 +59,7 @@ def require_parents(bodies: Sequence[Body]) -> None:
     known = {WORLD, *[body.name for body in bodies]}
     for body in bodies:
         if body.parent not in known:
-            raise MechanismError(f"body {body.name!r} has the unknown parent {body.parent!r}")
+            raise unknown_body(f"body {body.name!r} has the unknown parent {body.parent!r}", body.parent, known)
 
 
 @contextmanager

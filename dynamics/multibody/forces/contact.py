@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable, Collection
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from cgraph.extend import as_node
 
 from ..algebra import spatial
 from ..algebra.spatial import Triple, cross, dot, plus, scaled
-from ..bodies.body import WORLD, MechanismError, quantity, unit_axis, vector
+from ..bodies.body import WORLD, MechanismError, quantity, unit_axis, unknown_body, vector
 from ..parameters import Quantity, names_in, symbol, vanishes
 from ..sweeps.kinematic_chain import KinematicChain
 
@@ -138,11 +138,11 @@ def _sticks(contact: Contact) -> bool:
     return contact.to_radius is None and vanishes(contact.velocity)
 
 
-def check_contact(contact: Contact, bodies: Container[str]) -> None:
+def check_contact(contact: Contact, bodies: Collection[str]) -> None:
     """Raises MechanismError for a contact on a body that is not among `bodies`, and for numbers out of range."""
     for name in (contact.body, contact.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is contact.body)):
-            raise MechanismError(f"there is a contact on the unknown body {name!r:.80}")
+            raise unknown_body(f"there is a contact on the unknown body {name!r:.80}", name, bodies)
     where = contact.label
     if contact.body == contact.to:
         raise MechanismError(f"{where}: a contact needs two bodies")

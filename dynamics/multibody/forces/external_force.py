@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from cgraph import Node
 from cgraph.extend import topological
 
 from ..algebra.spatial import Triple
-from ..bodies.body import MechanismError, vector
+from ..bodies.body import MechanismError, unknown_body, vector
 from ..sweeps.kinematic_chain import KinematicChain
 
 FORCE = "force"  # tag
@@ -68,10 +68,10 @@ class Force:
         return named | {each for each in self.components if isinstance(each, str)}
 
 
-def check_force(force: Force, bodies: Container[str]) -> None:
+def check_force(force: Force, bodies: Collection[str]) -> None:
     """Raises MechanismError unless the force is three and three components at a point of one of `bodies`."""
     if not isinstance(force.body, str) or force.body not in bodies:
-        raise MechanismError(f"there is a force on the unknown body {force.body!r:.80}")
+        raise unknown_body(f"there is a force on the unknown body {force.body!r:.80}", force.body, bodies)
     where = f"the force on body {force.body!r}"
     vector(f"{where}: at", force.at)
     if force.frame not in FRAMES:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +17,7 @@ from cgraph.extend import Builder, building, cotangents
 
 from ...systems.kinematics import gathered
 from ..algebra.spatial import ZERO
-from ..bodies.body import Body, MechanismError, quantity
+from ..bodies.body import Body, MechanismError, quantity, unknown_body
 from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
 from ..parameters import Quantity, names_in, symbol
@@ -323,7 +323,7 @@ def _within(node: Node, limits: Range | None) -> Node:
 AnyForce = Force | JointForce | Contact
 
 
-def check_any_force(force: AnyForce, carried: Container[str], bodies: Sequence[Body]) -> None:
+def check_any_force(force: AnyForce, carried: Collection[str], bodies: Sequence[Body]) -> None:
     """Raises MechanismError for a force that bodies, or the joint of one, cannot have.  carried: names of bodies."""
     if isinstance(force, JointForce):
         _check_joint_force(force, bodies)
@@ -337,7 +337,7 @@ def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
     named = {body.name: body for body in bodies}
     for name, share in force.shares.items() if isinstance(force.body, str | Mapping) else [(force.body, 1.0)]:
         if not isinstance(name, str) or name not in named:
-            raise MechanismError(f"there is a force on the joint of the unknown body {name!r:.80}")
+            raise unknown_body(f"there is a force on the joint of the unknown body {name!r:.80}", name, named)
         body = named[name]
         force._require(f"the coefficient of {name!r}", share)
         if body.joint.kind in COMPOSITIONS or not isinstance(force.body, str):

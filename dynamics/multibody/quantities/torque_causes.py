@@ -26,9 +26,10 @@ from ...equations.formulations.lagrange_terms import (
 from ...equations.torque_parts.torque_decomposition import names_of_partials
 from ...equations.torque_parts.torque_table import TorqueTable
 from ...systems.arguments import new_variables
+from ...systems.energies import signed_terms
 from ...systems.kinematics import ONE, ZERO, changes
 from ...systems.model import Model, as_system, display_names
-from ...systems.system import System, signed_terms
+from ...systems.system import System
 from ..changes.switched_effects import without_effect
 from ..forces.contact import Contact
 from ..forces.external_force import Force

@@ -75,8 +75,8 @@ def ground(gravity: Array, *, in_plane: bool = False) -> Motion:
     in_plane: all bodies turn about parallel axes. Then g is kept apart from the vertical, so that heights are lengths:
     fewer nodes. In space the vertical has three components, which had better be scaled once.
     """
-    along = np.flatnonzero(gravity != 0.0)
-    if not len(along):
+    along = [i for i, each in enumerate(gravity) if isinstance(each, Node) or each != 0.0]
+    if not along:
         return Motion(STILL, STILL, STILL, ZERO)
     if in_plane and gravity.dtype != object:
         downward = spatial.unit(gravity)

@@ -20,7 +20,7 @@ from ...systems.body_terms import BodyTerms
 from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
-from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
+from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, unknown_body, vector
 from ..bodies.composed_joints import locked_parts, outer_names, require_parents
 from ..bodies.joint_coordinates import (
     coordinate_names,
@@ -314,7 +314,7 @@ class Mechanism(Structure):
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
         if not isinstance(body, str) or body not in self.carriers:
-            raise MechanismError(f"there is no body {body!r:.80} in the mechanism")
+            raise unknown_body(f"there is no body {body!r:.80} in the mechanism", body, self.carriers)
         return self._chain(body, self.system.q, self.system.qd)
 
     def joint_positions(self, q: ArrayLike) -> Array:

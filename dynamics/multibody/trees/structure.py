@@ -15,7 +15,16 @@ from numpy.typing import ArrayLike
 
 from cgraph._shared import HoldsNodes, kept_by_first
 
-from ..bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES, WORLD, Body, MechanismError, checked, quantities
+from ..bodies.body import (
+    BODY_QUANTITIES,
+    JOINT_QUANTITIES,
+    WORLD,
+    Body,
+    MechanismError,
+    checked,
+    quantities,
+    unknown_body,
+)
 from ..bodies.composed_joints import parts_of
 from ..forces.contact import CONTACT_QUANTITIES, Contact
 from ..forces.joint_force import AnyForce, JointForce
@@ -188,7 +197,7 @@ def descendants(bodies: Iterable[Body], root: str) -> set[str]:
     bodies = list(bodies)
     names = {body.name for body in bodies}
     if not isinstance(root, str) or root not in names:
-        raise MechanismError(f"there is no body {root!r:.80} in the mechanism")
+        raise unknown_body(f"there is no body {root!r:.80} in the mechanism", root, names)
     children: dict[str, list[str]] = {}
     for body in bodies:
         children.setdefault(body.parent, []).append(body.name)

@@ -168,3 +168,26 @@ def test_velocities_that_are_moved_by_rounding_alone_are_no_warning(unit: float)
     dyn.consistent_state(rod, q, [0.0, 0.0])
     with pytest.warns(dyn.ConstraintWarning, match="velocities do not meet the constraints"):
         dyn.consistent_state(rod, q, qd * [1.0, 1.0 + 1e-6])
+
+
+@pytest.mark.parametrize(
+    ("what", "row", "words"),
+    [
+        (
+            "velocity_constraints",
+            lambda q, qd, t: q[0] ** 2 + q[1] ** 2 - 1.0,
+            "in it; a condition on positions",
+        ),
+        ("velocity_constraints", lambda q, qd, t: cg.sin(t), "has no velocity in it"),
+        ("velocity_constraints", lambda q, qd, t: 0.0 * qd[0], "has no velocity in it"),
+        ("constraints", lambda q, t: cg.sin(t), "is the same at all coordinates"),
+        ("constraints", lambda q, t: cg.cos(q[0]) ** 2 + cg.sin(q[0]) ** 2 - 1.0, "is the same at all coordinates"),
+        ("constraints", lambda q, t: (q[0] ** 2 + q[1] ** 2 - 1.0) ** 2, "wherever it is met its slopes are 0"),
+        ("constraints", lambda q, t: 1.0 - cg.cos(q[0]), "wherever it is met its slopes are 0"),
+    ],
+)
+def test_a_condition_that_would_hold_nothing_is_refused(what: str, row: Any, words: str) -> None:
+    """Squares of what holds a pendulum have no slope on it; the root of each holds it."""
+    named = (lambda q, t: {"rod": row(q, t)}) if what == "constraints" else (lambda q, qd, t: {"rod": row(q, qd, t)})
+    with pytest.raises(ValueError, match=f"constraint 'rod' .*{words}"):
+        dyn.forward_dynamics(dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2, "x y", **{what: named}))

@@ -2,6 +2,8 @@
 
 import random
 from collections.abc import Callable
+from functools import reduce
+from operator import add, mul
 from pathlib import Path
 from typing import Any
 
@@ -272,3 +274,75 @@ def test_what_is_counted_as_off_is_among_the_slopes_that_a_model_has(formulation
         counted = verdict.off
         assert counted[1::2] == (system.n, system.n * (system.nq + system.n))
         assert (counted.torques > 0) == (counted.slopes > 0) == verdict.differs
+
+
+S = (1.0 - 0.25 * 0.7**2) ** 0.5
+# Terms of Lagrangians, (number, factor, ..), and the kinetic energy at q = (0.3, 0.5), qd = (0.7, -0.2).
+TERMS: dict[str, tuple[str, float, Callable[[Any, Any, Any], list[Any]]]] = {
+    "spring": ("x", 0.245, lambda q, v, t: [(0.5, v[0], v[0]), (-4.5, q[0], q[0])]),
+    "fall": ("x y", 0.265, lambda q, v, t: [(0.5, v[0], v[0]), (0.5, v[1], v[1]), (-9.81, q[1])]),
+    "pendulum": ("x", 0.245, lambda q, v, t: [(0.5, v[0], v[0]), (9.81, cg.cos(q[0]))]),
+    "orbit": ("x y", 0.2468, lambda q, v, t: [(0.5, v[0], v[0]), (0.5, q[0], q[0], v[1], v[1]), (1.0, 1.0 / q[0])]),
+    "magnet": ("x y", 0.265, lambda q, v, t: [(0.5, v[0], v[0]), (0.5, v[1], v[1]), (1.5, q[0], v[1]), (-3.0, q[0])]),
+    "pivot": ("x", 0.245, lambda q, v, t: [(0.5, v[0], v[0]), (1.0, v[0], t), (0.5, t, t), (-2.0, q[0], q[0])]),
+    "hoop": ("x", 0.245, lambda q, v, t: [(0.5, v[0], v[0]), (2.0, cg.sin(q[0]), cg.sin(q[0])), (9.81, cg.cos(q[0]))]),
+    "coupled": ("x y", 0.105, lambda q, v, t: [(0.5, v[0], v[0]), (1.0, v[0], v[1]), (1.0, q[0], q[1])]),
+    "free": ("x", 0.98, lambda q, v, t: [(2.0, v[0], v[0])]),
+    "fast": ("x", 4.0 / S - 4.0, lambda q, v, t: [(-4.0, cg.sqrt(1.0 - 0.25 * v[0] ** 2)), (-1.0, q[0], q[0])]),
+    "henon": ("x y", 0.265, lambda q, v, t: [(0.5, v[0], v[0]), (0.5, v[1], v[1]), (-1.0, q[0], q[0], q[1])]),
+}
+
+
+def total(terms: list[Any], factor: float = 1.0) -> Any:
+    return reduce(add, [reduce(mul, (factor * number, *rest)) for number, *rest in terms])
+
+
+TYPINGS: list[Callable[[list[Any]], Any]] = [
+    total,
+    lambda terms: total(terms[::-1]),
+    lambda terms: 0.5 * total(terms, 2.0),
+    lambda terms: -(total(terms, -3.0) / 3.0),
+    lambda terms: [total([term]) for term in terms],
+    lambda terms: total(terms) + 3.0,
+    lambda terms: 0.25 * ((total(terms) + 1.0) * (total(terms) + 1.0) - (total(terms) - 1.0) * (total(terms) - 1.0)),
+    lambda terms: 0.25 * reduce(add, [(total([term]) + 1.0) ** 2 - (total([term]) - 1.0) ** 2 for term in terms]),
+]
+
+
+@mark.parametrize("name", TERMS)
+def test_how_a_lagrangian_is_typed_changes_no_verdict_and_no_kinetic_energy(name: str) -> None:
+    coordinates, expected, terms = TERMS[name]
+    told, at = [], {"q0": 0.3, "q1": 0.5, "qd0": 0.7, "qd1": -0.2, "t": 0.4}
+    for typing in TYPINGS:
+        system = dyn.System(lambda q, qd, t, typing=typing: typing(terms(q, qd, t)), coordinates)
+        kinetic = dyn.kinetic_energy(system)
+        assert kinetic.evaluate({n: at[n] for n in kinetic.input_names})["K"] == approx(expected, rel=1e-12)
+        verdicts = [dyn.formulation_verdict(system, formulation) for formulation in dyn.FORMULATIONS]
+        words = [(each.differs, each.proved, each.reason, each.taken, each.off) for each in verdicts]
+        off = [(each.symbol, *[round(x, 9) for x in each[2:]]) for one in verdicts for each in one.excess.values()]
+        told.append((words, off))
+    assert told == told[:1] * len(TYPINGS)
+
+
+def test_the_kinetic_energy_is_that_of_the_tags_where_there_are_any() -> None:
+    """A hoop that turns: by the tags the turning is kinetic, else a part of the energy at rest."""
+
+    def lagrangian(tags: tuple[str, str]) -> dyn.System:
+        def energy(q: Any, qd: Any, t: Any) -> Any:
+            with cg.tag(tags[0]):
+                kinetic = 0.5 * (qd[0] ** 2 + 4.0 * cg.sin(q[0]) ** 2)
+            with cg.tag(tags[1]):
+                potential = -9.81 * cg.cos(q[0])
+            return kinetic - potential
+
+        return dyn.System(energy, "x")
+
+    for tags, expected, words in (
+        (("kinetic", "potential"), 0.02 + 2.0 * np.sin(1.0) ** 2, "the terms of L tagged 'kinetic'"),
+        (("a", "b"), 0.02, "E - P, the energy less that at rest"),
+    ):
+        system = lagrangian(tags)
+        assert dyn.kinetic_energy(system).evaluate({"q0": 1.0, "qd0": 0.2})["K"] == approx(expected)
+        verdict = dyn.formulation_verdict(system, "kinetic_only")
+        assert (verdict.differs, verdict.taken) == (tags[0] == "kinetic", f"K is {words}.")
+        assert str(verdict).endswith(verdict.taken)

@@ -189,6 +189,7 @@ def test_a_parameter_that_cannot_be_is_refused(component: Any, parameters: dict[
 def test_places_of_no_body_and_forces_in_files_are_refused() -> None:
     for call, said in (
         (lambda: ROTOR.position("hand"), "there is no body 'hand' in the mechanism"),
+        (lambda: ROTOR.position("roto"), "there is no body 'roto' in the mechanism; did you mean 'rotor'?"),
         (lambda: ROTOR.position("rotor", 1.0), "position on body 'rotor': at must be (3,) finite numbers, got 1.0"),
         (lambda: dyn.to_mjcf(pushed(ROTOR, "rotor")), "MJCF has no forces, there is one on body 'rotor'"),
     ):

@@ -87,6 +87,8 @@ def test_a_scene_that_would_rest_for_ever_starts_where_it_moves(name):
     assert np.isfinite(rates).all()
     assert rates.any()
     assert moving_start(scene) is scene
+    driven = moving_start(RESTING[name], free=False)  # something else may move it
+    assert (driven is RESTING[name]) == ("center" not in name)
     assert start_text(scene) != "0"
     motion = dyn.simulate(scene, scene.q, scene.qd or None, 3.0)  # a center that attracts is passed by
     assert motion.stats.success

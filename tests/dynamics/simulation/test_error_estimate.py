@@ -282,3 +282,12 @@ def test_jacobians_and_factorizations_are_counted(method: str, jacobians: int, f
     else:
         assert (run.njev, run.nlu) == (jacobians * run.stats.steps, factors * trials)
     assert (run.nfev, run.status, run.success) == (run.stats.nfev, 0, True)
+
+
+@mark.parametrize("method", ["rk4", "verlet"])
+def test_the_clock_is_no_part_of_an_estimate_of_what_does_not_depend_on_time(method):
+    swing = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 9.81 * cg.cos(q[0]), "angle")
+    runs = [dyn.simulate(swing, [0.5], [0.0], t0 + 1.0, method, t0=t0, dt=1e-3) for t0 in (0.0, 1e3, 1e12)]
+    for run in runs:
+        assert (run.q[-1].tolist(), run.stats.error) == (runs[0].q[-1].tolist(), runs[0].stats.error)
+        assert run.stats.error < 1e-5

@@ -10,7 +10,7 @@ def atwood() -> dyn.System:
 
 
 def hoop() -> dyn.System:
-    """A bead on a hoop that turns: K depends on the place."""
+    """A bead on a hoop that turns: at rest on it, its energy depends on the place."""
     return dyn.System(
         lambda q, qd, t: 0.245 * (qd[0] ** 2 + 5.29 * cg.sin(q[0]) ** 2) + 6.867 * cg.cos(q[0]), ["angle"]
     )

@@ -117,6 +117,11 @@ def test_a_notebook_plays_it():
         ((ARM, []), {}, "1 to 4 motions side by side, got 0"),
         ((ARM, [FALL] * 5), {}, "1 to 4 motions side by side, got 5"),
         ((ARM, FALL), {"speed": 1e-9}, "at speed 1e-09 are 2e[+]09; speed 0.008 makes it 10 s long"),
+        (
+            (ARM, replace(FALL, t=FALL.t[:1], q=FALL.q[:1], qd=FALL.qd[:1])),
+            {},
+            "nothing to film: pass --t-end",
+        ),
         ((ARM, FALL), {"speed": 1e9}, "a film has 2 to 1000 frames"),
         ((ARM, FALL, "film.avi"), {}, "a film's file must end in .gif, got 'film.avi'"),
         ((ARM, FALL), {"marked": ["a"]}, "there is no motion 'a'"),

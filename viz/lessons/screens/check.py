@@ -118,7 +118,8 @@ def _second_try(subject: Subject) -> str:
         told = f"Here τ is then right, however small dt is: {in_letters(verdict.reason)}."
     return (
         "<p><b>A second try</b> of the paper keeps the step and takes the kinetic energy K in place of L for the "
-        f"momentum, so that the potential energy is reached no more. {told} The chain rule needs neither trick.</p>"
+        f"momentum, so that the potential energy is reached no more. {in_letters(verdict.taken)} {told} The chain rule "
+        "needs neither trick.</p>"
     )
 
 

@@ -1,6 +1,6 @@
 """Cases: the rows of the stability table, models with a start, a horizon, what to watch and a bound to meet."""
 
-from cgraph._shared import memo
+from cgraph._shared import memo, or_nearest
 
 from ...accuracy_task import RTOL, Criterion, StabilityCase
 from . import chains, extremes, fields, orbits, rotation, stiff
@@ -57,5 +57,5 @@ def load(name: str) -> StabilityCase:
     ((1.0,), 50.0, ['error'])
     """
     if not isinstance(name, str) or name not in table():
-        raise ValueError(f"there is no case {name!r}; the cases are {', '.join(table())}")
+        raise ValueError(f"there is no case {name!r:.80}; {or_nearest(str(name), [*table()])}")
     return table()[name]
