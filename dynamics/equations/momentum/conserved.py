@@ -10,9 +10,10 @@ from cgraph import Graph, Node
 from cgraph._shared import columns, shortened
 from cgraph.extend import Builder, as_node, building, cotangents, folded, hessian_nodes, topological
 
+from ...systems.energies import signed_terms
 from ...systems.kinematics import ONE, ZERO, dot
 from ...systems.model import Model, as_system
-from ...systems.system import System, signed_terms
+from ...systems.system import System
 from ..energies import energy
 from ..equation import called, documented, entries
 from ..equations_of_motion import momentum
