@@ -33,6 +33,7 @@ def tangents(
     (<node exp>, <node variable x_dot>)
     """
     dots = dict(seeds)
+    along = any([seed.value is None for seed in seeds.values()])  # else one of several columns, which share slopes
     reached = ReachedNodes(seeds if zero_wins else dict.fromkeys(seeds))
     with building(build or Builder()) as labelled:
         for node in topological(outputs):
@@ -41,7 +42,7 @@ def tangents(
             labelled(node.label.derived(TANGENT))
             total: Node | None = None
             moving = [arg for arg in node.args if arg in dots]
-            divisor, partials = reached.quotient(node, moving, moving)
+            divisor, partials = reached.quotient(node, moving, once=along and len(moving) > 1)
             for arg, partial in zip(node.args, partials, strict=True):
                 if arg in dots:
                     term = reached.product(node.op, arg, partial, dots[arg], bounded=divisor is not None)
@@ -68,24 +69,24 @@ class ReachedNodes:
         self._flags: dict[Node, Node | None] = dict(seeds)  # None: the sweep reaches the node everywhere
         self._behind_selection: set[Node] = set()
 
-    def quotient(
-        self, node: Node, moving: Sequence[Node], sources: Sequence[Node]
-    ) -> tuple[Node | None, Sequence[Node]]:
-        """A divisor of all products with the partials of a node, and these times it: (None, partials) if there is none.
+    def quotient(self, node: Node, sources: Sequence[Node], *, once: bool) -> tuple[Node | None, Sequence[Node]]:
+        """A divisor of a node's partials, and these times it; or None, and the partials.
 
-        Dividing last, a sweep divides once for all arguments that are `moving`, and needs no guard: 0 / divisor is 0.
+        Such a sweep divides what passes the node, not its partials. It needs no guard, for 0 / divisor is 0, and one
+        division serves several arguments; but partials are made once for all columns of a Jacobian.
+        sources: what it passes from.  once: whether to divide so where no guard is needed, too.
         """
         rule, form = node.op.quotient, None
-        if rule is not None and not self._behind_selection.intersection(sources):
-            if len(moving) > 1 or any([self._flags.get(source) is not None for source in sources]):
-                form = rule(node, *node.args)
+        flagged = any([self._flags.get(source) is not None for source in sources])
+        if rule is not None and (once or flagged) and not self._behind_selection.intersection(sources):
+            form = rule(node, *node.args)
         divisor, partials = form or (None, node.op.partials(node, *node.args))
         return None if divisor is None else as_node(divisor), [as_node(each) for each in partials]
 
-    def product(self, op: Row, source: Node, a: Node, b: Node, *, bounded: bool) -> Node:
+    def product(self, op: Row, source: Node, a: Node, b: Node, *, bounded: bool = False) -> Node:
         """a * b for a partial of `op` and the tangent or cotangent of `source`; 0 where the sweep misses `source`.
 
-        bounded: whether the partial is finite wherever the value is.
+        bounded: whether the partial is finite where the value is, so that no guard is needed.
         """
         if op.selects or 0.0 in (a.value, b.value):  # then 0 times anything is 0: what a branch not taken contributes
             return apply(ROWS["zero_safe_mul"], a, b)

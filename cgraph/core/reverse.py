@@ -54,7 +54,7 @@ def cotangents(
             if through and node in through:
                 bar = bar * through[node]
             terms: dict[Node, Node] = {}  # of one use, summed by argument first: x * x gives 2 * (bar * x)
-            divisor, partials = reached.quotient(node, [arg for arg in node.args if arg in active], [node])
+            divisor, partials = reached.quotient(node, [node], once=sum([arg in active for arg in node.args]) > 1)
             if divisor is not None:
                 bar = bar / divisor
             for arg, partial in zip(node.args, partials, strict=True):

@@ -191,7 +191,7 @@ def test_a_look_at_slopes_sees_every_infinite_one(f, monkeypatch):
         found.append([[function.jacobian(p), function.jvp(p, np.eye(2)), function.vjp(p, np.eye(2))] for p in points])
         found[-1] += [[function.hessian(p, weights) for weights in np.eye(2)] for p in points]
     for plain, guarded in zip(*found, strict=True):
-        np.testing.assert_allclose(plain, guarded, rtol=LAST_BITS)
+        np.testing.assert_allclose(plain, guarded, rtol=LAST_BITS, atol=LAST_BITS)  # slopes of order 1 cancel
 
 
 @pytest.mark.parametrize("cost", [LANES, WRITTEN])
