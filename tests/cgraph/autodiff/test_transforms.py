@@ -18,6 +18,7 @@ NAMES = {  # of a transform's inputs and outputs
     "jvp": (cg.jvp(GRAPH), "x y x_dot y_dot", "f_dot g_dot"),
     "vjp": (cg.vjp(GRAPH), "x y f_bar g_bar", "x_bar y_bar"),
     "gradient": (cg.gradient(ONE), "x y", "df/dx df/dy"),
+    "hvp": (cg.hvp(ONE), "x y x_dot y_dot", "df/dx_dot df/dy_dot"),
     "jacobian": (cg.jacobian(GRAPH), "x y", "df/dx df/dy dg/dx dg/dy"),
     "jacobian in another order": (cg.jacobian(ONE, ["y", x]), "x y", "df/dy df/dx"),
     "hessian": (cg.hessian(ONE), "x y", "d2f/dxdx d2f/dxdy d2f/dydx d2f/dydy"),
@@ -96,7 +97,7 @@ def test_entries_whose_joined_names_are_alike_are_named_by_place():
     assert list(jacobian.outputs) == ["d0/d0", "d0/d1", "d1/d0", "d1/d1"]
 
 
-@each_row("transform", [cg.jvp, cg.vjp, cg.gradient, cg.jacobian, cg.hessian])
+@each_row("transform", [cg.jvp, cg.vjp, cg.hvp, cg.gradient, cg.jacobian, cg.hessian])
 def test_an_input_named_twice_is_refused(transform):
     with pytest.raises(GraphError, match="wrt names the input x twice"):
         transform(ONE, ["x", y, x])
@@ -109,6 +110,7 @@ def test_wrt_is_a_name_a_variable_or_a_sequence_of_them(wrt):
     assert list(cg.gradient(ONE, wrt).outputs) == ["df/dy"]
     assert list(cg.jacobian(GRAPH, wrt).outputs) == ["df/dy", "dg/dy"]
     assert list(cg.hessian(ONE, wrt).outputs) == ["d2f/dydy"]
+    assert list(cg.hvp(ONE, wrt).outputs) == ["df/dy_dot"]
 
 
 def test_a_wide_jacobian_goes_in_reverse_and_a_tall_one_forward():
