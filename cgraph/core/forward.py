@@ -72,8 +72,7 @@ class ReachedNodes:
     def quotient(self, node: Node, sources: Sequence[Node], *, once: bool) -> tuple[Node | None, Sequence[Node]]:
         """A divisor of a node's partials, and these times it; or None, and the partials.
 
-        Such a sweep divides what passes the node, not its partials. It needs no guard, for 0 / divisor is 0, and one
-        division serves several arguments; but partials are made once for all columns of a Jacobian.
+        By these a sweep divides once, last, and needs no guard, for 0 / divisor is 0; but columns can share partials.
         sources: what it passes from.  once: whether to divide so where no guard is needed, too.
         """
         rule, form = node.op.quotient, None

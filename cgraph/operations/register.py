@@ -108,8 +108,7 @@ def _partials(op: Op) -> Graph:
 def _quotient(op: Op) -> list[Graph]:
     """The partials by the column `quotient`, if it gives some."""
     args = tuple([variable(name) for name in op.parameters])
-    form = op.quotient(Node(op, args), *args) if op.quotient is not None else None
-    if form is None:
+    if op.quotient is None or (form := op.quotient(Node(op, args), *args)) is None:
         return []
     return [Graph(args, {name: as_node(each) / form[0] for name, each in zip(op.parameters, form[1], strict=True)})]
 
