@@ -8,7 +8,7 @@ TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 if TYPE_CHECKING:
     from .autodiff.hessian_solve import hessian_solve as hessian_solve
     from .autodiff.jacobian import hessian as hessian, jacobian as jacobian
-    from .autodiff.products import gradient as gradient, jvp as jvp, vjp as vjp
+    from .autodiff.products import gradient as gradient, hvp as hvp, jvp as jvp, vjp as vjp
     from .autodiff.sparsity import sparsity as sparsity
     from .bridges.casadi import to_casadi as to_casadi
     from .bridges.jax import as_jax as as_jax, to_jax as to_jax

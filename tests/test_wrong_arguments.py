@@ -136,7 +136,7 @@ CALLS = {
     **{f"cg.{op.name}": call(function(op), *[X] * op.arity) for op in OPS.values()},
     **{f"cg.{name}": call(getattr(cg, name), GRAPH) for name in ("simplify", "structure_hash")},
     **{f"cg.{name}": call(getattr(cg, name), GRAPH, wrt=None) for name in ("gradient", "hessian", "jacobian")},
-    **{f"cg.{name}": call(getattr(cg, name), GRAPH, wrt=None) for name in ("jvp", "sparsity", "vjp")},
+    **{f"cg.{name}": call(getattr(cg, name), GRAPH, wrt=None) for name in ("hvp", "jvp", "sparsity", "vjp")},
     "cg.compare": call(cg.compare, GRAPH, SQUARES, atoms=(), classify=None, names=None),
     "cg.compile": call(cg.compile, GRAPH, "python", fast=False, fma=True, cache=False),
     "cg.constant": call(cg.constant, 1.0),
@@ -590,8 +590,8 @@ def said(function, *args, **named):
     return None
 
 
-GRAPH_ALONE = """compile gradient hessian jacobian jvp lint simplify sparsity structure_hash to_c to_casadi to_jax to_js
-    to_networkx vjp"""
+GRAPH_ALONE = """compile gradient hessian hvp jacobian jvp lint simplify sparsity structure_hash to_c to_casadi to_jax
+    to_js to_networkx vjp"""
 GRAPH_FIRST = [
     *[(function, ()) for function in (dyn.spurious_nodes, viz.page, viz.to_dot)],
     *[(getattr(cg, name), ()) for name in GRAPH_ALONE.split()],

@@ -1,9 +1,10 @@
-"""Products: graphs of J x_dot and J^T y_bar of a graph, one sweep each."""
+"""Products: graphs of J x_dot and J^T y_bar of a graph, one sweep each, and of the Hessian times x_dot, two."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..core.builder import Builder
 from ..core.forward import tangents
 from ..core.graph import Graph
 from ..core.node import Node, as_node, variable
@@ -15,7 +16,7 @@ from ..writing.naming import free_suffix
 def jvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
     """x -> y becomes (x, x_dot) -> y_dot with y_dot = J(x) x_dot: one forward sweep.
 
-    An entry of x_dot that is zero counts for nothing, also where y has no slope in it.
+    An entry of x_dot that is zero counts for nothing, also where y has no slope in it, if values are finite.
 
     Parameters
     ----------
@@ -47,11 +48,11 @@ def jvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
     return forward_products(graph, graph.select_inputs(wrt), zero_wins=True)
 
 
-def forward_products(graph: Graph, chosen: Sequence[Node], *, zero_wins: bool) -> Graph:
-    """`jvp` by these inputs; zero_wins: as for `tangents`."""
+def forward_products(graph: Graph, chosen: Sequence[Node], *, zero_wins: bool, build: Builder | None = None) -> Graph:
+    """`jvp` by these inputs; zero_wins, build: as for `tangents`."""
     suffix = free_suffix("_dot", graph.input_names, [str(node.name) for node in chosen])
     seeds = {node: variable(f"{node.name}{suffix}") for node in chosen}
-    dots = tangents(seeds, graph.outputs.values(), zero_wins=zero_wins and len(seeds) > 1)
+    dots = tangents(seeds, graph.outputs.values(), build, zero_wins=zero_wins and len(seeds) > 1)
     zero = as_node(0.0)
     outputs = {f"{name}{suffix}": dots.get(node, zero) for name, node in graph.outputs.items()}
     return Graph((*graph.inputs, *seeds.values()), outputs)
@@ -60,7 +61,7 @@ def forward_products(graph: Graph, chosen: Sequence[Node], *, zero_wins: bool) -
 def vjp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
     """x -> y becomes (x, y_bar) -> x_bar with x_bar = J(x)^T y_bar: one reverse sweep.
 
-    An entry of y_bar that is zero counts for nothing, also where that output has no slope.
+    An entry of y_bar that is zero counts for nothing, also where that output has no slope, if values are finite.
 
     Parameters
     ----------
@@ -132,8 +133,48 @@ def gradient(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
     {'df/dx': 3.0, 'df/dy': 2.0}
     """
     require_graph("gradient", graph)
+    return _gradient(graph, graph.select_inputs(wrt), Builder())
+
+
+def _gradient(graph: Graph, chosen: Sequence[Node], build: Builder) -> Graph:
     output = graph.only_output()
     (name,) = graph.outputs
-    chosen = graph.select_inputs(wrt)
-    results = cotangents({output: as_node(1.0)}, chosen)
+    results = cotangents({output: as_node(1.0)}, chosen, build)
     return Graph(graph.inputs, {f"d{name}/d{node.name}": bar for node, bar in zip(chosen, results, strict=True)})
+
+
+def hvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
+    """x -> y, one output, becomes (x, x_dot) -> H(x) x_dot with the Hessian H: forward mode over reverse mode.
+
+    A gradient and its `jvp`, a few times the operations of `graph` whatever the number of inputs; the matrix is never
+    formed. An entry of x_dot that is zero counts for nothing, as in `jvp`.
+
+    Parameters
+    ----------
+    graph : Graph
+        A function with one output y.
+    wrt : str, Node or sequence of these, optional
+        The inputs x to differentiate by; by default all.
+
+    Returns
+    -------
+    Graph
+        Its inputs are those of `graph`, then a tangent `x_dot` for each of `wrt`; its outputs, the rates of the entries
+        of the gradient along x_dot, are `dy/dx_i_dot`. Where such a name is taken the suffix is `_dot2`, `_dot3`, ...
+
+    Raises
+    ------
+    GraphError
+        If there are several outputs, or the graph has no such input.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> graph = cg.hvp(cg.Graph([x, y], {"f": x * x * y}))
+    >>> graph.evaluate({"x": 2.0, "y": 3.0, "x_dot": 1.0, "y_dot": 10.0})
+    {'df/dx_dot': 46.0, 'df/dy_dot': 4.0}
+    """
+    require_graph("hvp", graph)
+    chosen, build = graph.select_inputs(wrt), Builder()
+    return forward_products(_gradient(graph, chosen, build), chosen, zero_wins=True, build=build)

@@ -39,6 +39,11 @@ class Builder:
             value = op.scalar(*[arg.value for arg in args])
             if value == value:  # no constant is NaN: the operation then stays
                 return constant(value)
+        # A difference made here is turned round; one that was there before has other uses, and its sign stays apart.
+        if op.name == "neg" and args[0].op.name == "sub":
+            a, b = args[0].args
+            if self._made.get(("sub", id(a), id(b))) is args[0]:
+                return self(args[0].op, (b, a), label, name)
         # a * b and b * a are one node, with a constant first, else in the order of the one that was made first.
         if op.commutative and args[1].op is CONSTANT and args[0].op is not CONSTANT:
             args = args[::-1]

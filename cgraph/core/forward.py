@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from .builder import Builder
 from .label import TANGENT
@@ -33,6 +33,7 @@ def tangents(
     (<node exp>, <node variable x_dot>)
     """
     dots = dict(seeds)
+    along = any([seed.value is None for seed in seeds.values()])  # else one of several columns, which share slopes
     reached = ReachedNodes(seeds if zero_wins else dict.fromkeys(seeds))
     with building(build or Builder()) as labelled:
         for node in topological(outputs):
@@ -40,13 +41,17 @@ def tangents(
                 continue
             labelled(node.label.derived(TANGENT))
             total: Node | None = None
-            for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
+            moving = [arg for arg in node.args if arg in dots]
+            divisor, partials = reached.quotient(node, moving, once=along and len(moving) > 1)
+            for arg, partial in zip(node.args, partials, strict=True):
                 if arg in dots:
-                    term = reached.product(node.op, arg, partial, dots[arg])
+                    term = reached.product(node.op, arg, partial, dots[arg], bounded=divisor is not None)
                     total = term if total is None else total + term
                     if term.value != 0.0:
                         reached.pass_on(node.op, arg, node, partial)
             assert total is not None
+            if divisor is not None:
+                total = total / divisor
             if total.value != 0.0:
                 dots[node] = total
     return dots
@@ -64,12 +69,28 @@ class ReachedNodes:
         self._flags: dict[Node, Node | None] = dict(seeds)  # None: the sweep reaches the node everywhere
         self._behind_selection: set[Node] = set()
 
-    def product(self, op: Row, source: Node, a: Node, b: Node) -> Node:
-        """a * b for a partial of `op` and the tangent or cotangent of `source`; 0 where the sweep misses `source`."""
+    def quotient(self, node: Node, sources: Sequence[Node], *, once: bool) -> tuple[Node | None, Sequence[Node]]:
+        """A divisor of a node's partials, and these times it; or None, and the partials.
+
+        By these a sweep divides once, last, and needs no guard, for 0 / divisor is 0; but columns can share partials.
+        sources: what it passes from.  once: whether to divide so where no guard is needed, too.
+        """
+        rule, form = node.op.quotient, None
+        flagged = any([self._flags.get(source) is not None for source in sources])
+        if rule is not None and (once or flagged) and not self._behind_selection.intersection(sources):
+            form = rule(node, *node.args)
+        divisor, partials = form or (None, node.op.partials(node, *node.args))
+        return None if divisor is None else as_node(divisor), [as_node(each) for each in partials]
+
+    def product(self, op: Row, source: Node, a: Node, b: Node, *, bounded: bool = False) -> Node:
+        """a * b for a partial of `op` and the tangent or cotangent of `source`; 0 where the sweep misses `source`.
+
+        bounded: whether the partial is finite where the value is, so that no guard is needed.
+        """
         if op.selects or 0.0 in (a.value, b.value):  # then 0 times anything is 0: what a branch not taken contributes
             return apply(ROWS["zero_safe_mul"], a, b)
         flag = self._flags.get(source)
-        may_be_infinite = op.singular is not None or source in self._behind_selection
+        may_be_infinite = (op.singular is not None and not bounded) or source in self._behind_selection
         # With a finite constant no flag is needed: a constant slope takes 0 to 0, a constant cotangent is nowhere 0.
         if flag is None or not may_be_infinite or any([x.value is not None and math.isfinite(x.value) for x in (a, b)]):
             return a * b

@@ -54,9 +54,12 @@ def cotangents(
             if through and node in through:
                 bar = bar * through[node]
             terms: dict[Node, Node] = {}  # of one use, summed by argument first: x * x gives 2 * (bar * x)
-            for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
+            divisor, partials = reached.quotient(node, [node], once=sum([arg in active for arg in node.args]) > 1)
+            if divisor is not None:
+                bar = bar / divisor
+            for arg, partial in zip(node.args, partials, strict=True):
                 if arg in active:
-                    term = reached.product(node.op, node, bar, partial)
+                    term = reached.product(node.op, node, bar, partial, bounded=divisor is not None)
                     terms[arg] = terms[arg] + term if arg in terms else term
                     if term.value != 0.0:
                         reached.pass_on(node.op, node, arg, partial)

@@ -15,6 +15,7 @@ class Row:
     partials(y, *args): the partial derivative in each argument, a node or a number.
     commutative: f(a, b) = f(b, a).  selects: whether an argument that is not used must not reach the result.
     fold(*args): the simpler node of the operation, or None.  singular: not None where a slope is unbounded.
+    quotient(y, *args): a divisor and the partials times it, all finite where y is, the divisor not 0; or None.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Row:
     selects: bool = False
     fold: Callable[..., Any] | None = None
     singular: Callable[..., str | None] | None = None
+    quotient: Callable[..., tuple[Any, tuple[Any, ...]] | None] | None = None
 
     def __repr__(self) -> str:
         return f"<op {self.name}>"

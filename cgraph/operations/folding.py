@@ -23,7 +23,14 @@ def add(a: Node, b: Node) -> Node | None:
         return a - b.args[0]
     if a.op.name == "neg":
         return b - a.args[0]
-    return 2.0 * a if a is b else None
+    return 2.0 * a if a is b else _doubled("add", a, b)
+
+
+def _doubled(name: str, a: Node, b: Node) -> Node | None:
+    """2 * x + 2 * y or their difference with the factor taken out, as slopes of squares have it: exactly the same."""
+    if a.op.name == b.op.name == "mul" and a.args[0].value == b.args[0].value == 2.0:
+        return 2.0 * apply(OPS[name], a.args[1], b.args[1])
+    return None
 
 
 def _offset(c: float, b: Node) -> Node | None:
@@ -45,9 +52,7 @@ def sub(a: Node, b: Node) -> Node | None:
         return constant(0.0)
     if b.op.name == "neg":
         return a + b.args[0]
-    if a.op.name == "neg":
-        return -(a.args[0] + b)
-    return None
+    return -(a.args[0] + b) if a.op.name == "neg" else _doubled("sub", a, b)
 
 
 def mul(a: Node, b: Node) -> Node | None:
@@ -66,9 +71,8 @@ def mul(a: Node, b: Node) -> Node | None:
             return constant(-c) * b.args[0]
         if b.op.name == "mul" and (inner := b.args[0].value) is not None and math.isfinite(c * inner) and c * inner:
             return constant(c * inner) * b.args[1]
-        if b.op.name == "mul":
-            return _cancelled(c, b)
-        return _times_quotient(a, b)
+        rest = _cancelled(c, b)
+        return _times_quotient(a, b) if rest is None else rest
     left, right = a.op.name, b.op.name
     if a is b and left in ("abs", "hypot"):  # whose squares are smooth
         squares = [x * x for x in a.args]
@@ -89,7 +93,8 @@ def mul(a: Node, b: Node) -> Node | None:
 
 
 def _times_quotient(a: Node, b: Node) -> Node | None:
-    """a * b where b is a quotient or has one and a factor goes: x * (1 / c) = x / c, x * (b / (x * y)) = b / y, ..
+    """a * b where b is a quotient or has one and a factor goes: x * (1 / c) = x / c, x * (b / (x * y)) = b / y, ..,
+    (2 * x) * (0.5 / c) = x / c.
 
     It is also exact: b / x of a subnormal x, as in the slope of x * log(x), overflows.
     """
@@ -104,8 +109,9 @@ def _times_quotient(a: Node, b: Node) -> Node | None:
     if name != "div":
         return None
     top, c = b.args
-    if top.value == 1.0:
-        return a / c
+    rest = a if top.value == 1.0 else None if top.value is None else _cancelled(top.value, a)
+    if rest is not None and (rest is not c or _cancels(c)):
+        return rest / c
     if c is a and _cancels(c):
         return top
     if c.op.name == "mul" and a in c.args:
@@ -122,12 +128,20 @@ def _cancels(x: Node) -> bool:
     return x.op.singular is None
 
 
-def _cancelled(c: float, b: Node) -> Node | None:
-    """c * b for a product b with a factor d * x whose d is 1 / c or -1 / c: 2 * ((0.5 * x) * y) = x * y."""
-    for factor, other in (b.args, b.args[::-1]):
-        if factor.op.name == "mul" and (d := factor.args[0].value) is not None and abs(c * d) == 1.0:
-            return constant(c * d) * (factor.args[1] * other)
-    return None
+def _cancelled(c: float, b: Node, levels: int = 3) -> Node | None:
+    """c * b where a constant factor d of b goes, c d = 1 or -1: 2 * ((0.5 * x) * y) = x * y, 2 * (0.5 / y) = 1 / y.
+
+    levels: how deep in b, of products and dividends, the factor may stand.
+    """
+    if b.op.name not in ("mul", "div") or not levels:
+        return None
+    first, second = b.args
+    if (d := first.value) is not None:
+        return constant(c * d) * apply(b.op, constant(1.0), second) if abs(c * d) == 1.0 else None
+    if (rest := _cancelled(c, first, levels - 1)) is not None:
+        return None if b.op.name == "div" and rest is second and not _cancels(rest) else apply(b.op, rest, second)
+    rest = _cancelled(c, second, levels - 1) if b.op.name == "mul" else None
+    return None if rest is None else rest * first
 
 
 def div(a: Node, b: Node) -> Node | None:
@@ -148,11 +162,9 @@ def div(a: Node, b: Node) -> Node | None:
 
 
 def neg(a: Node) -> Node | None:
-    """-a: signs cancel, turn a difference round or go into a constant factor."""
+    """-a: signs cancel or go into a constant factor; differences are turned round by the `Builder`."""
     if a.op.name == "neg":
         return a.args[0]
-    if a.op.name == "sub":
-        return a.args[1] - a.args[0]
     if a.op.name == "mul" and a.args[0].value is not None:
         return constant(-a.args[0].value) * a.args[1]
     return None

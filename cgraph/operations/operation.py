@@ -89,6 +89,9 @@ class Op(Row):
     singular : callable
         Of the arguments' bounds: where among them the slope is unbounded, in words, or None. Default None, but where
         there is no `interval` either, that no bounds are known.
+    quotient : callable
+        Of the output's node and the arguments': a divisor, and the partials times it, all finite and the divisor not 0
+        where the value is finite; or None. By it the slopes need no guard against 0 times infinity. Default none.
     rounding : float
         Units of rounding, 2**-53, of its own result. Default two, as for a function of the C library.
     python, numpy : str

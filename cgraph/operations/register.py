@@ -11,7 +11,7 @@ from keyword import iskeyword
 import numpy as np
 
 from ..core.graph import Graph
-from ..core.node import Node, variable
+from ..core.node import Node, as_node, variable
 from .operation import OPS, Op, enter
 from .table import ROWS
 
@@ -80,9 +80,10 @@ def register(op: Op, *, replace: bool = False) -> None:
         _filled(op, "llvm", line, (), _LLVM)
     OPS[op.name] = op  # partials may have nodes of the operation itself
     try:
-        partials = _partials(op)
+        forms = [_partials(op), *_quotient(op)]
         for sample in op.samples:
-            _check_columns(op, partials, sample)
+            for partials in forms:
+                _check_columns(op, partials, sample)
         _check_interval(op)
     except BaseException:
         if before is None:
@@ -102,6 +103,14 @@ def _partials(op: Op) -> Graph:
     if len(partials) != op.arity:
         raise ValueError(f"operation {op.name!r} takes {op.arity} argument(s), its partials are {len(partials)}")
     return Graph(args, dict(zip(op.parameters, partials, strict=True)))
+
+
+def _quotient(op: Op) -> list[Graph]:
+    """The partials by the column `quotient`, if it gives some."""
+    args = tuple([variable(name) for name in op.parameters])
+    if op.quotient is None or (form := op.quotient(Node(op, args), *args)) is None:
+        return []
+    return [Graph(args, {name: as_node(each) / form[0] for name, each in zip(op.parameters, form[1], strict=True)})]
 
 
 def _check_columns(op: Op, partials: Graph, sample: tuple[float, ...]) -> None:

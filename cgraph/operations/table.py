@@ -24,6 +24,13 @@ def _pow_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
     return zero_safe_mul(b, a ** (b - 1.0)), where(power, power * log(a), power)
 
 
+def _pow_quotient(y: Node, a: Node, b: Node) -> tuple[Node | float, tuple[Node | float, ...]] | None:
+    power = b.value
+    if power is None or not math.isfinite(power) or 0.0 < power < 1.0:
+        return None
+    return (a, (b * y, 0.0)) if power < 0.0 else (1.0, (zero_safe_mul(b, a ** (b - 1.0)), 0.0))
+
+
 def _atan2_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
     h = hypot(a, b)  # dividing twice by h neither overflows nor underflows where b / (a*a + b*b) would
     return b / h / h, -(a / h / h)
@@ -114,7 +121,7 @@ ROWS = (
     Op("div", 2, ieee(operator.truediv, np.divide), np.divide, lambda y, a, b: (1.0 / b, -(y / b)), ((0.3, -0.7),),
        about="The quotient a / b.", symbol="÷", infix=("/", PRODUCT), mathml=MathML("<mfrac>{0}{1}</mfrac>", (0, 0), PRODUCT),
        fold=folding.div, series=series.div, operator=operator.truediv, domain=(_REAL, _POSITIVE),
-       interval=bounds.div, singular=bounds.divisor, rounding=1.0,
+       interval=bounds.div, singular=bounds.divisor, quotient=lambda y, a, b: (b, (1.0, -y)), rounding=1.0,
        python="{} / {}", numpy="np.divide({}, {})", llvm=texts.llvm_arithmetic("fdiv"), c="{0} / {1}", javascript="(a, b) => a / b"),
     Op("neg", 1, operator.neg, np.negative, lambda y, a: (-1.0,), ((0.3,),), about="-x.",
        symbol="−", mathml=MathML("<mo>−</mo>{0}", (PRODUCT,), SUM), signs=(-1,), fold=folding.neg,
@@ -123,7 +130,7 @@ ROWS = (
     Op("pow", 2, math.pow, values.power_arrays, _pow_partials, ((0.6, -0.7), (1.7, 2.5)), arguments="base exponent", ufunc=np.power,
        about="base ** exponent.", symbol="xʸ", mathml=MathML("<msup><mrow>{0}</mrow>{1}</msup>", (FUNCTION, 0), PRODUCT),
        fold=folding.pow, series=series.pow, operator=operator.pow, domain=(_POSITIVE, (-3.0, 3.0)),
-       interval=bounds.pow, singular=bounds.power, c="{name}_pow({0}, {1})", c_helper=texts.C_POWER,
+       interval=bounds.pow, singular=bounds.power, quotient=_pow_quotient, c="{name}_pow({0}, {1})", c_helper=texts.C_POWER,
        # as in C: 1 to any power and anything to the power 0 are 1, NaN or not
        javascript="(a, b) => (a === 1 || b === 0 || (a === -1 && (b === Infinity || b === -Infinity)) ? 1 : a ** b)"),
     Op("sqrt", 1, math.sqrt, np.sqrt, lambda y, a: (0.5 / y,), ((0.6,),), about="The square root of x >= 0.",
@@ -136,10 +143,10 @@ ROWS = (
        domain=((-2.0, 2.0),), interval=bounds.rising("expm1")),
     Op("log", 1, math.log, np.log, lambda y, a: (1.0 / a,), ((0.6,),), about="The natural logarithm of x > 0.",
        domain=(_POSITIVE,), interval=bounds.rising("log", (0.0, _INF)),
-       singular=bounds.below(0.0, "value and slope are infinite"), vector="log"),
+       singular=bounds.below(0.0, "value and slope are infinite"), quotient=lambda y, a: (a, (1.0,)), vector="log"),
     Op("log1p", 1, math.log1p, np.log1p, lambda y, a: (1.0 / (1.0 + a),), ((0.3,),), domain=(_UNIT,),
        about="log(1 + x) for x > -1, exact for small x too.", interval=bounds.rising("log1p", (-1.0, _INF)),
-       singular=bounds.below(-1.0, "value and slope are infinite")),
+       singular=bounds.below(-1.0, "value and slope are infinite"), quotient=lambda y, a: (1.0 + a, (1.0,))),
     Op("sin", 1, math.sin, np.sin, lambda y, a: (cos(a),), ((0.3,), (-2.0,)), about="The sine of x, in radians.",
        domain=(_REAL,), interval=bounds.wave("sin", "cos", 1.0), vector="angle",
        fold=lambda a: -sin(a.args[0]) if a.op.name == "neg" else None),
@@ -174,7 +181,7 @@ ROWS = (
        about="1 - erf(x), exact for large x too.", domain=((-2.5, 5.0),),
        interval=bounds.rising("erfc", falling=True), javascript=texts.JAVASCRIPT_ERFC),
     Op("tan", 1, math.tan, np.tan, lambda y, a: (1.0 + y * y,), ((0.3,),), about="The tangent of x, in radians.",
-       domain=((-1.2, 1.2),), interval=bounds.tan, singular=bounds.no_tangent),
+       domain=((-1.2, 1.2),), interval=bounds.tan, singular=bounds.no_tangent, quotient=lambda y, a: (1.0, (1.0 + y * y,))),
     Op("asin", 1, math.asin, np.arcsin, lambda y, a: (1.0 / sqrt((1.0 - a) * (1.0 + a)),), ((0.3,),), domain=(_UNIT,),
        about="The angle between -pi/2 and pi/2 whose sine is x, in radians.",
        interval=bounds.rising("asin", (-1.0, 1.0)), singular=bounds.arc),

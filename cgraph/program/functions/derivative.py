@@ -36,6 +36,7 @@ AnyRunner = NativeRunner | PythonRunner
 Ready = Callable[[Program], AnyRunner]  # makes a program ready to run
 Chosen = tuple[int, ...] | None  # the numbers of inputs; None for all
 CHECK = 256  # operations that take as long as to look whether slopes are infinite
+DIVISION = 8  # operations that take as long as a division
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 LEAST_BLOCK = 64  # points in a block, a multiple of every processor's vectors
 Bind = Callable[[Array, Array], Callable[[], None]]  # x, y -> a function of nothing
@@ -371,9 +372,15 @@ class Derivatives:
         return self._graph.inputs if chosen is None else tuple([self._graph.inputs[k] for k in chosen])
 
 
+def _cost(graph: Graph) -> int:
+    """The operations of a graph, a division counted as several."""
+    counts = graph.counts()
+    return counts.nodes + (DIVISION - 1) * counts.by_operation.get("div", 0)
+
+
 def _derivative_of(derive: Callable[..., Graph], directions: int) -> Derivative:
     """The derivative in which zeros win over infinite slopes; where that takes long, only where there are such."""
     plain = direction_split(derive(zero_wins=False), directions, divide=False)
     guarded = direction_split(derive(zero_wins=True), directions)
-    saved = len(guarded.linear.nodes) - len(plain.linear.nodes)
+    saved = _cost(guarded.linear) - _cost(plain.linear)
     return Derivative(plain, guarded) if saved > CHECK else Derivative(guarded)

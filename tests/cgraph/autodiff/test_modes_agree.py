@@ -178,6 +178,16 @@ def test_a_zero_in_a_seed_wins_over_a_slope_that_is_not_there():
     assert cg.vjp(two).evaluate({"x": 0.0, "root_bar": 0.0, "line_bar": 1.0}) == {"x_bar": 3.0}
 
 
+@pytest.mark.parametrize("f", [1.0 / x, x / (x + 1.0), x**-1, x**-2.5, x**3, x**1.5, cg.log(x), cg.log1p(x), cg.tan(x)])
+def test_a_zero_in_a_seed_needs_no_guard_where_a_slope_is_infinite_only_with_its_value(f):
+    pushed, pulled = cg.jvp(cg.Graph([x, y], {"f": f + y})), cg.vjp(cg.Graph([x], {"f": f, "line": 3.0 * x}))
+    assert "where" not in pushed.counts().by_operation | pulled.counts().by_operation
+    for at in (5e-324, 1e-310, 1e-200, 1e-120, 0.5, 1e100, 1e308):
+        if math.isfinite(cg.Graph([x], {"f": f}).evaluate({"x": at})["f"]):
+            assert pushed.evaluate({"x": at, "y": 0.0, "x_dot": 0.0, "y_dot": 1.0}) == {"f_dot": 1.0}
+            assert pulled.evaluate({"x": at, "f_bar": 0.0, "line_bar": 1.0}) == {"x_bar": 3.0}
+
+
 def test_a_seed_counts_though_another_leaves_it_out():
     root = cg.sqrt(x)
     one = cg.constant(1.0)

@@ -191,7 +191,7 @@ def test_a_look_at_slopes_sees_every_infinite_one(f, monkeypatch):
         found.append([[function.jacobian(p), function.jvp(p, np.eye(2)), function.vjp(p, np.eye(2))] for p in points])
         found[-1] += [[function.hessian(p, weights) for weights in np.eye(2)] for p in points]
     for plain, guarded in zip(*found, strict=True):
-        np.testing.assert_allclose(plain, guarded, rtol=LAST_BITS)
+        np.testing.assert_allclose(plain, guarded, rtol=LAST_BITS, atol=LAST_BITS)  # slopes of order 1 cancel
 
 
 @pytest.mark.parametrize("cost", [LANES, WRITTEN])
@@ -233,34 +233,6 @@ def test_names_are_no_matter():
     assert function.jacobian([2.0, 3.0]).tolist() == [[3.0, 2.0], [1.0, 0.0], [0.0, 0.0]]
     assert function.vjp([2.0, 3.0], [1.0, 1.0, 1.0]).tolist() == [4.0, 2.0]
     assert function.hessian([2.0, 3.0], [1.0, 1.0, 1.0]).tolist() == [[0.0, 1.0], [1.0, 0.0]]
-
-
-def test_graphs_without_inputs_and_without_slopes(backend):
-    constant = compiled(cg.Graph([], {"f": 1.0, "g": 2.0}), backend)
-    flat = compiled(cg.Graph([x, y], {"f": cg.floor(x), "g": 2.0}), backend)
-    for function, n in ((constant, 0), (flat, 2)):
-        point = np.ones(n)
-        assert function.jacobian(point).tolist() == np.zeros((2, n)).tolist()
-        assert function.jacobian(point, sparse=True).nnz == 0
-        assert function.jvp(point, np.ones((3, n))).tolist() == np.zeros((3, 2)).tolist()
-        assert function.vjp(point, np.ones((3, 2))).tolist() == np.zeros((3, n)).tolist()
-        assert function.hessian(point, [1.0, 2.0]).tolist() == np.zeros((n, n)).tolist()
-
-
-@pytest.mark.parametrize("cost", [LANES, WRITTEN])
-def test_a_bound_jacobian_writes_its_array(backend, cost):
-    function = compiled(example(), backend, cost)
-    point, dense, entries = POINT.copy(), np.full((8, 4), np.nan), np.full(cg.sparsity(example()).nnz, np.nan)
-    whole, part = function.bind_jacobian(point, dense), function.bind_jacobian(point, entries)
-    for scale in (1.0, 0.5):
-        point[:] = scale * POINT
-        assert whole() is None
-        assert part() is None
-        assert np.array_equal(dense, function.jacobian(point))
-        assert np.array_equal(entries, function.jacobian(point, sparse=True).data)
-    for run in (whole, part, function.bind(point, np.empty(8))):
-        with pytest.raises(TypeError, match="a bound call holds addresses of this process"):
-            pickle.dumps(run)
 
 
 def test_a_bound_jacobian_needs_memory_that_it_can_use(backend):
