@@ -10,7 +10,7 @@ from cgraph import Graph, Node
 from cgraph._shared import columns, shortened
 from cgraph.extend import Builder, as_node, building, cotangents, folded, hessian_nodes, topological
 
-from ...systems.energies import signed_terms
+from ...systems.energies import signed_terms, split_by_motion
 from ...systems.kinematics import ONE, ZERO, dot
 from ...systems.model import Model, as_system
 from ...systems.system import System
@@ -139,7 +139,8 @@ def _moving_frame(system: System) -> bool:
     (lagrangian,) = folded([system.lagrangian], build)
     if set(system.qd) & set(topological(entries(hessian_nodes(lagrangian, system.qd, build)))):
         return True
-    rest, own = folded([lagrangian, system.kinetic], build, dict.fromkeys(system.qd, ZERO))
+    moving, _ = split_by_motion(lagrangian, system.qd)
+    rest, own = folded([lagrangian, moving], build, dict.fromkeys(system.qd, ZERO))
     terms = [node for sign, node in signed_terms(rest) if sign > 0 and "potential" not in node.tags]
     odd: dict[Node, frozenset[Node]] = {}  # factors of the state that stand in a product an odd number of times
     fixed: set[Node] = set()
