@@ -25,8 +25,8 @@ LABELS = ("tags", "roles", "lines")
 def to_networkx(graph: Graph) -> networkx.MultiDiGraph:
     """The graph as one of networkx, from arguments to uses.
 
-    Nodes have the attribute op; name, value and input (its place) if any; tags, roles, lines and outputs as JSON. Edges
-    have a slot. So all attributes are texts and numbers, as files of GraphML and GEXF have them.
+    Nodes have the attribute op; name, number and input (its place) if any; tags, roles, lines and outputs as JSON.
+    Edges have a slot. So all attributes are texts and numbers, as files of GraphML, GEXF, GML and JSON have them.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def to_networkx(graph: Graph) -> networkx.MultiDiGraph:
         named.setdefault(node, {})[name] = place
     for node in dict.fromkeys((*nodes, *inputs)):
         number[node] = len(number)
-        there = {"name": node.name, "value": node.value, "input": places.get(node)}
+        there = {"name": node.name, "number": node.value, "input": places.get(node)}
         result.add_node(
             number[node],
             op=node.op.name,
@@ -118,9 +118,12 @@ def from_networkx(network: networkx.DiGraph) -> Graph:
     for key in order:
         read = partial(_read, key, network.nodes[key])
         op, name = read("op", str), read("name", _name, None)
+        cytoscape = "id" in network.nodes[key]  # whose JSON names all nodes, and has a value of its own
+        name = None if cytoscape and name == network.nodes[key]["id"] else name
         if op not in (CONSTANT.name, VARIABLE.name, *OPS):
             raise GraphError(f"operation {op!r} of node {key!r} is not in the table: register its row first")
-        value = read("value", float) if op == CONSTANT.name else None
+        before = "value" in network.nodes[key] and not cytoscape  # as files of version 0.1 have it
+        value = read("value" if before else "number", float) if op == CONSTANT.name else None
         if op == VARIABLE.name:
             inputs[read("input", int)] = read("name", _name)
         slots = {_read(key, data, "slot", int): number[source] for source, _, data in network.in_edges(key, data=True)}
@@ -129,12 +132,12 @@ def from_networkx(network: networkx.DiGraph) -> Graph:
             raise GraphError(f"node {key!r}, {op}, takes {arity} arguments in slots from 0, got {sorted(slots)}")
         labels = tuple(
             [  # a source line is a list in JSON
-                tuple([SourceLine(*each) if isinstance(each, list) else each for each in read(label, json.loads, ())])
+                tuple([SourceLine(*each) if isinstance(each, list) else each for each in read(label, _json, ())])
                 for label in LABELS
             ]
         )
         kept.append((op, tuple([slots[slot] for slot in range(arity)]), value, name, labels))
-        outputs |= {place: (output, number[key]) for output, place in read("outputs", json.loads, {}).items()}
+        outputs |= {place: (output, number[key]) for output, place in read("outputs", _json, {}).items()}
     given = tuple([inputs[place] for place in sorted(inputs)])
     return restored(given, tuple(kept), dict([outputs[place] for place in sorted(outputs)]))
 
@@ -153,6 +156,10 @@ def _read(key: object, data: Mapping[str, Any], name: str, kind: Callable[[Any],
 
 def _name(name: str) -> str:
     return check_name("a node", name)
+
+
+def _json(text: str | list[Any]) -> Any:
+    return json.loads(text) if text != [] else text  # what networkx makes of "[]" in GML
 
 
 def _text(value: object) -> str:
