@@ -70,9 +70,8 @@ def mul(a: Node, b: Node) -> Node | None:
             return _cancelled(c, b)
         return _times_quotient(a, b)
     left, right = a.op.name, b.op.name
-    if a is b and left in ("abs", "hypot"):  # whose squares are smooth
-        squares = [x * x for x in a.args]
-        return squares[0] + squares[1] if left == "hypot" else squares[0]
+    if a is b and left == "abs":
+        return a.args[0] * a.args[0]
     if left == "neg":
         return a.args[0] * b.args[0] if right == "neg" else -(a.args[0] * b)
     if right == "neg":
@@ -104,6 +103,10 @@ def _times_quotient(a: Node, b: Node) -> Node | None:
     if name != "div":
         return None
     top, c = b.args
+    for x, other in [(a, constant(1.0)), *(zip(a.args, a.args[::-1], strict=True) if a.op.name == "mul" else ())]:
+        for arg, slope in zip(x.args, x.op.partials(x, *x.args), strict=True) if x.op.name == "hypot" else ():
+            if slope is b:  # a length times its slope is smooth
+                return other * arg
     if top.value == 1.0:
         return a / c
     if c is a and _cancels(c):
