@@ -103,10 +103,10 @@ def _times_quotient(a: Node, b: Node) -> Node | None:
     if name != "div":
         return None
     top, c = b.args
-    for x, other in [(a, constant(1.0)), *(zip(a.args, a.args[::-1], strict=True) if a.op.name == "mul" else ())]:
+    for x, other in ((a, constant(1.0)), *((a.args, a.args[::-1]) if a.op.name == "mul" else ())):
         for arg, slope in zip(x.args, x.op.partials(x, *x.args), strict=True) if x.op.name == "hypot" else ():
             if slope is b:  # a length times its slope is smooth
-                return other * arg
+                return apply(OPS["mul"], other, arg)
     if top.value == 1.0:
         return a / c
     if c is a and _cancels(c):

@@ -30,10 +30,8 @@ def _atan2_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
 
 
 def _hypot_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
-    length, unit = (
-        y + where(y, 0.0, _SMALLEST_NORMAL),
-        where(y, 1.0, 8.0),
-    )  # slopes of what is 0 at the origin are infinite
+    length = y + where(y, 0.0, _SMALLEST_NORMAL)
+    unit = where(y, 1.0, 8.0)  # second slopes at the origin are infinite
     return a * unit / length, b * unit / length
 
 

@@ -132,19 +132,19 @@ def from_networkx(network: networkx.DiGraph) -> Graph:
             raise GraphError(f"node {key!r}, {op}, takes {arity} arguments in slots from 0, got {sorted(slots)}")
         labels = tuple(
             [  # a source line is a list in JSON
-                tuple([SourceLine(*each) if isinstance(each, list) else each for each in read(label, _json, ())])
+                tuple([SourceLine(*each) if isinstance(each, list) else each for each in read(label, json.loads, ())])
                 for label in LABELS
             ]
         )
         kept.append((op, tuple([slots[slot] for slot in range(arity)]), value, name, labels))
-        outputs |= {place: (output, number[key]) for output, place in read("outputs", _json, {}).items()}
+        outputs |= {place: (output, number[key]) for output, place in read("outputs", json.loads, {}).items()}
     given = tuple([inputs[place] for place in sorted(inputs)])
     return restored(given, tuple(kept), dict([outputs[place] for place in sorted(outputs)]))
 
 
 def _read(key: object, data: Mapping[str, Any], name: str, kind: Callable[[Any], Any], default: object = ...) -> Any:
     """An attribute of a node or of an edge to it."""
-    if name not in data:
+    if data.get(name, []) == []:  # what networkx makes of "[]" in GML
         if default is ...:
             raise GraphError(f"node {key!r} has no attribute {name!r}, which to_networkx gives it or its edges")
         return default
@@ -156,10 +156,6 @@ def _read(key: object, data: Mapping[str, Any], name: str, kind: Callable[[Any],
 
 def _name(name: str) -> str:
     return check_name("a node", name)
-
-
-def _json(text: str | list[Any]) -> Any:
-    return json.loads(text) if text != [] else text  # what networkx makes of "[]" in GML
 
 
 def _text(value: object) -> str:
