@@ -54,9 +54,11 @@ if TYPE_CHECKING:
     from .util.extras import install as install, required as required
     from .util.json_type import Json as Json
     from .util.require import (
+        is_function as is_function,
         require_choice as require_choice,
         require_flag as require_flag,
         require_graph as require_graph,
+        require_kind as require_kind,
         require_mapping as require_mapping,
         require_path as require_path,
         require_sequence as require_sequence,
@@ -64,7 +66,7 @@ if TYPE_CHECKING:
         require_whole as require_whole,
     )
     from .util.threads import share as share, thread_count as thread_count
-    from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
+    from .util.words import counted as counted, entry as entry, nearest as nearest, or_nearest as or_nearest
     from .writing.formulas import Side as Side, entries_of as entries_of, fraction as fraction, statements as statements
     from .writing.holds_nodes import HoldsNodes as HoldsNodes
     from .writing.latex import LATEX as LATEX, latex_block as latex_block, number_text as number_text

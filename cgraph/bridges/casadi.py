@@ -21,7 +21,7 @@ def to_casadi(graph: Graph, name: str = "function") -> Function:
 
     Node for node, in scalars of CasADi (SX): derivatives, C code, maps and nonlinear programs are CasADi's from there
     on. Values are those of `evaluate` but for rounding of functions, and but for NaN in a minimum or maximum: CasADi's
-    leaves it out.
+    leaves it out. CasADi cancels in what it builds of the function, derivatives and calls with symbols, such as x - x.
 
     Parameters
     ----------
@@ -59,10 +59,13 @@ def to_casadi(graph: Graph, name: str = "function") -> Function:
     ca = required("casadi", "to_casadi needs CasADi", "casadi")
     if not isinstance(name, str) or not ca.Function.check_name(name):
         raise ValueError(f"name must be letters, digits and single underscores, a letter first, got {name!r:.60}")
-    x = ca.SX.sym("x", len(graph.inputs))
-    values = translated(
-        graph.nodes, dict(zip(graph.inputs, ca.vertsplit(x), strict=True)), casadi_operations(ca), ca.SX
-    )
+    x, simplifies = ca.SX.sym("x", len(graph.inputs)), ca.GlobalOptions.getSimplificationOnTheFly()
+    env = dict(zip(graph.inputs, ca.vertsplit(x), strict=True))
+    ca.GlobalOptions.setSimplificationOnTheFly(False)  # which takes x - x for 0 and (x + 1e16) - 1e16 for x
+    try:
+        values = translated(graph.nodes, env, casadi_operations(ca), ca.SX)
+    finally:
+        ca.GlobalOptions.setSimplificationOnTheFly(simplifies)
     y = ca.vertcat(*[values[node] for node in graph.outputs.values()])
     return ca.Function(name, [x], [y], ["x"], ["y"])
 
@@ -77,6 +80,10 @@ def casadi_operations(ca: ModuleType) -> Operations:
         zero = ca.logic_or(ca.logic_and(a == 0, ca.logic_not(finite(b))), ca.logic_and(b == 0, ca.logic_not(finite(a))))
         return ca.if_else(zero, 0, a * b)
 
+    def logistic(a: Any) -> Any:
+        e = ca.exp(ca.if_else(a < 0, a, -a))  # at most 1; fabs has the slope 0 at 0
+        return ca.if_else(a < 0, e, 1) / (1 + e)
+
     return operations(
         "CasADi",
         (ca,),
@@ -88,7 +95,7 @@ def casadi_operations(ca: ModuleType) -> Operations:
             "less": lambda a, b: a < b,
             "less_equal": lambda a, b: a <= b,
             "log2": lambda a: ca.log(a) / ca.log(2.0),
-            "logistic": lambda a: 1 / (1 + ca.exp(-a)),
+            "logistic": logistic,
             "maximum": ca.fmax,
             "minimum": ca.fmin,
             "not_equal": lambda a, b: a != b,

@@ -74,7 +74,9 @@ def to_jax(graph: Graph) -> Function:
             x = x.astype(float)
         _require_inputs(x.shape, len(graph.inputs))
         env = {node: x[..., k] for k, node in enumerate(graph.inputs)}
-        values = translated(graph.nodes, env, function_of)
+        smallest = float(jnp.finfo(x.dtype).tiny)  # in place of constants that would be 0 in these numbers
+        number = lambda value: float(np.copysign(max(abs(value), smallest), value)) if value else 0.0  # noqa: E731
+        values = translated(graph.nodes, env, function_of, number)
         results = [jnp.asarray(values[node], x.dtype) for node in graph.outputs.values()]
         return jnp.stack([jnp.broadcast_to(each, x.shape[:-1]) for each in results], axis=-1)
 
@@ -85,7 +87,8 @@ def as_jax(fn: Compiled) -> Function:
     """The compiled graph as a function within JAX, which calls its machine code: nothing is traced or compiled anew.
 
     `jit`, `vmap` and further axes in front call it for all points at once. The derivatives, forward and reverse and of
-    any order, are its Jacobian, `fn.jacobian`, and the compiled Jacobians of that.
+    any order, are its Jacobian, `fn.jacobian`, and the compiled Jacobians of that. Threads of XLA take subnormal
+    numbers for 0, so results differ there: log(1e-310) is -745, for -714.
 
     Parameters
     ----------
@@ -139,6 +142,8 @@ class _Called:
     def __init__(self, jax: ModuleType, fn: Compiled, outputs: tuple[int, ...], *, slopes: bool = False) -> None:
         self._jax, self._fn, self._slopes = jax, fn, slopes
         self._shape = (*outputs, fn.n_in) if slopes else outputs
+        for shape in ((fn.n_in,), (1, fn.n_in)):  # makes all code now: threads of XLA flush subnormal numbers
+            self._at(np.full(shape, np.nan))
 
     def _at(self, x: object) -> Array:
         points = np.asarray(x)
@@ -149,7 +154,7 @@ class _Called:
 
     @cached_property
     def slope(self) -> _Called:
-        """The derivative, made when it is first asked for."""
+        """The derivative, made when it is first traced."""
         fn = derived(self._fn, jacobian) if self._slopes else self._fn
         return _Called(self._jax, fn, self._shape, slopes=True)
 

@@ -13,6 +13,7 @@ from ..autodiff.products import jvp, vjp
 from ..core.checks import GraphError
 from ..program.functions.compiled import Compiled
 from ..util.extras import required
+from ..util.require import require_kind
 from .derived import derived, require_compiled, values_at
 
 if TYPE_CHECKING:
@@ -62,8 +63,7 @@ def to_torch(fn: Compiled) -> Callable[[Tensor], Tensor]:
 
 
 def _checked(torch: ModuleType, call: Callable[..., Tensor], of: _WithDerivatives, x: Tensor) -> Tensor:
-    if not isinstance(x, torch.Tensor):
-        raise TypeError(f"x must be a tensor, got {type(x).__name__}: {x!r:.60}")
+    require_kind("x", x, torch.Tensor, "a tensor")
     if x.dtype != torch.float64 or x.device.type != "cpu":
         raise TypeError(f"to_torch calls machine code for float64 on the CPU, got {x.dtype} on {x.device}")
     if not x.shape or x.shape[-1] != of.fn.n_in:

@@ -9,7 +9,7 @@ from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import SUM, columns
-from ..util.require import require_graph, require_texts
+from ..util.require import require_graph, require_kind, require_mapping, require_texts
 from ..util.words import listed, nearest
 from ..writing.source_lines import lines_text
 
@@ -63,11 +63,11 @@ class Names:
 
     def shown(self, name: str) -> str:
         """Name of a node, input or output as a person writes it."""
-        return self._called.get(name, name)
+        return self._called.get(require_kind("name", name, str), name)
 
     def meant(self, name: str) -> str:
         """The graph's name of what a person calls so."""
-        return self._meant.get(name, name)
+        return self._meant.get(require_kind("name", name, str), name)
 
     def called(self, who: Name) -> str:
         """Name, as a person writes it, of a node or of the name of one."""
@@ -77,7 +77,7 @@ class Names:
         """Values by the graph's names of inputs. Raises GraphError, naming `what`, for what is no input, or twice."""
         result: dict[str, Value] = {}
         inputs = dict.fromkeys(self.graph.input_names)
-        for name, value in values.items():
+        for name, value in require_mapping(what, values, "input: value").items():
             meant = self.meant(name) if isinstance(name, str) else name
             if meant not in inputs:
                 has = listed([self.shown(each) for each in inputs]) or "none"
@@ -142,7 +142,7 @@ class Names:
 
     def short(self, node: Node) -> str:
         """A name, a number, or the %number of the listing; a question mark for an operation of no such line."""
-        if node.op is CONSTANT:
+        if require_kind("node", node, Node).op is CONSTANT:
             return f"{node.value:.6g}"
         if node.name:
             return self.shown(node.name)
@@ -150,7 +150,7 @@ class Names:
 
     def text(self, node: Node, length: int = LONGEST_TEXT) -> str:
         """A name, or the formula, such as `qd0 * dt`, as deep as `length` characters allow."""
-        if node.name or not node.args:
+        if require_kind("node", node, Node).name or not node.args:
             return self.short(node)
         for depth in range(DEEPEST_TEXT, 1, -1):
             text = self._written(node, depth)[0]
@@ -160,7 +160,7 @@ class Names:
 
     def line(self, node: Node) -> str:
         """The node as in the listing, with its tags, and its lines if known: `%7 = qd0 * dt  [euler]  arm.py:12`."""
-        tags = f"  [{', '.join(sorted(node.tags))}]" if node.tags else ""
+        tags = f"  [{', '.join(sorted(node.tags))}]" if require_kind("node", node, Node).tags else ""
         tags += f"  {lines_text([node])}" if node.lines else ""
         if not node.args:
             return self.short(node) + tags
@@ -171,7 +171,7 @@ class Names:
 
     def formula(self, node: Node) -> str:
         """The operation on its arguments, these by name or %number: `qd0 * dt`."""
-        return self._written(node, 1)[0]
+        return self._written(require_kind("node", node, Node), 1)[0]
 
     def _written(self, node: Node, depth: int) -> tuple[str, int]:
         """Text with at most `depth` operations within one another, and how strongly the outermost one binds."""

@@ -40,7 +40,7 @@ def enclosure(graph: Graph, exact: Sequence[str | Node] = ()) -> Graph:
     {'y.low': 1.0, 'y.high': 5.0}
     """
     require_graph("enclosure", graph)
-    for each in require_sequence("exact", exact, "inputs of the graph"):
+    for each in (exact := require_sequence("exact", exact, "inputs of the graph", (str, Node))):
         if (each.name if isinstance(each, Node) else each) not in graph.input_names:
             raise GraphError(f"exact: the graph has no input {each!r:.60} (it has {', '.join(graph.input_names)})")
     chosen = graph.select_inputs(exact) if exact else ()

@@ -74,9 +74,8 @@ def mul(a: Node, b: Node) -> Node | None:
         rest = _cancelled(c, b)
         return _times_quotient(a, b) if rest is None else rest
     left, right = a.op.name, b.op.name
-    if a is b and left in ("abs", "hypot"):  # whose squares are smooth
-        squares = [x * x for x in a.args]
-        return squares[0] + squares[1] if left == "hypot" else squares[0]
+    if a is b and left == "abs":
+        return a.args[0] * a.args[0]
     if left == "neg":
         return a.args[0] * b.args[0] if right == "neg" else -(a.args[0] * b)
     if right == "neg":
@@ -109,6 +108,10 @@ def _times_quotient(a: Node, b: Node) -> Node | None:
     if name != "div":
         return None
     top, c = b.args
+    for x, other in ((a, constant(1.0)), *((a.args, a.args[::-1]) if a.op.name == "mul" else ())):
+        for arg, slope in zip(x.args, x.op.partials(x, *x.args), strict=True) if x.op.name == "hypot" else ():
+            if slope is b:  # a length times its slope is smooth
+                return apply(OPS["mul"], other, arg)
     rest = a if top.value == 1.0 else None if top.value is None else _cancelled(top.value, a)
     if rest is not None and (rest is not c or _cancels(c)):
         return rest / c

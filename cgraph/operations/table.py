@@ -37,8 +37,9 @@ def _atan2_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
 
 
 def _hypot_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
-    length = y + _SMALLEST_FLOAT  # what it is, but for 0, and for the last bit of a subnormal number
-    return a / length, b / length
+    length = y + where(y, 0.0, _SMALLEST_NORMAL)
+    unit = where(y, 1.0, 8.0)  # second slopes at the origin are infinite
+    return a * unit / length, b * unit / length
 
 
 def _tanh_partials(y: Node, a: Node) -> tuple[Node]:
@@ -86,7 +87,7 @@ _REAL = (-8.0, 8.0)
 _POSITIVE = (0.4, 2.5)
 _UNIT = (-0.8, 0.8)
 _INF = math.inf
-_SMALLEST_FLOAT = math.ulp(0.0)
+_SMALLEST_NORMAL = 2.0**-1022  # what is smaller counts as 0 in some processes
 _WRITTEN_OUT, _MOST_PARTS = ("add", "sub", "neg", "mul", "div", "abs", "minimum", "maximum"), 32
 
 # By place: name, arity, value on floats, value on arrays, partials of (output y, arguments), samples. The rest by name.

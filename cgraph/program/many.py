@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from ..core.graph import Graph
 from ..operations.table import where
+from ..util.require import require_kind
 from ..writing.naming import variables
 from .program import Program, live_registers, outliving, unused_sign
 from .statement import Statement, reads_and_writes, row_of
@@ -31,8 +32,7 @@ def many(program: Program) -> Program:
     >>> [type(each).__name__ for each in turns.body]  # keep n, a turn, choose, go on?
     ['Map', 'Call', 'Map', 'Call']
     """
-    if not isinstance(program, Program):
-        raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
+    require_kind("program", program, Program)
     return many_keeping(program, program.registers)
 
 

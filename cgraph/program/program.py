@@ -9,6 +9,7 @@ from types import MappingProxyType
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..util.explain_failure import explain_failure
+from ..util.require import require_mapping
 from . import table  # noqa: F401 (which fills the table)
 from .listing import Listing
 from .statement import Statement, bodies_of, length_of, names_in, require_length, require_once, row_of
@@ -87,7 +88,7 @@ class Program:
                 x = 1/2 * x
         record: x
         """
-        text = Listing(self.registers, names)
+        text = Listing(self.registers, require_mapping("names", names, "name: graph"))
         fed = [f"before each pass: {', '.join(self.feed)} from the feed"] if self.feed else []
         condition = f" if {self.record_if} > 0" if self.record_if else ""
         record = f"record{condition}: {', '.join(self.record) or 'nothing'}"

@@ -11,6 +11,7 @@ import numpy as np
 from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..core.graph import Graph
+from ..util.require import require_sequence
 
 Lengths = Mapping[str, int]  # of registers, by name
 Names = tuple[str, ...]
@@ -146,7 +147,7 @@ def effects(statements: Iterable[Statement]) -> tuple[dict[str, None], dict[str,
     """
     reads: dict[str, None] = {}
     writes: dict[str, None] = {}
-    for statement in statements:
+    for statement in require_sequence("statements", statements, "statements", Statement):
         before, after = reads_and_writes(statement)
         reads |= {name: None for name in before if name not in writes}
         writes |= dict.fromkeys(after)

@@ -46,6 +46,18 @@ def require_choice(what: str, value: object, choices: Collection[str]) -> str:
     raise ValueError(f"{what} must be one of {', '.join(choices)}, got {value!r:.60}")
 
 
+def require_kind(what: str, value: Any, kind: Any, noun: str = "") -> Any:
+    """The value, if it is of that class, in messages `noun`. Raises TypeError for anything else."""
+    if isinstance(value, kind):
+        return value
+    raise TypeError(f"{what} must be {noun or f'a {kind.__name__}'}, got {type(value).__name__}: {value!r:.60}")
+
+
+def is_function(value: object) -> bool:
+    """Whether the value can be called and is no class."""
+    return callable(value) and not isinstance(value, type)
+
+
 def require_sequence(what: str, value: object, of: str, kind: type | tuple[type, ...] = object) -> tuple[Any, ...]:
     """The members of a sequence, each an instance of `kind`; an iterator is read once. Raises TypeError.
 
@@ -65,9 +77,8 @@ def require_mapping(what: str, value: object, of: str) -> Mapping[Any, Any]:
 
     of: from what to what, as "input: value".
     """
-    if not isinstance(value, Mapping):
-        raise TypeError(f"{what} must be a mapping {{{of}}}, got {type(value).__name__}: {value!r:.60}")
-    return value
+    found: Mapping[Any, Any] = require_kind(what, value, Mapping, f"a mapping {{{of}}}")
+    return found
 
 
 def require_texts(what: str, value: object) -> Mapping[str, str]:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
+from typing import TypeVar
 
+Entry = TypeVar("Entry")
 _MOST_NAMES, _LONGEST_NAME = 5000, 80  # names compared, and characters of each: an error should come at once
 _ALIKE = 0.7  # share of the letters that two names have in common at least
 _MOST_LISTED = 12  # names that are listed where none is near
@@ -29,6 +31,13 @@ def or_nearest(name: str, known: Sequence[str]) -> str:
     if near := nearest(name, known):
         return f"did you mean {' or '.join(map(repr, near))}?"
     return f"it has {listed(known) or 'none'}"
+
+
+def entry(what: str, table: Mapping[str, Entry], name: str) -> Entry:
+    """The entry of that name. Raises ValueError for any other.  what: "there is no .."."""
+    if isinstance(name, str) and name in table:
+        return table[name]
+    raise ValueError(f"{what} {name!r:.80}; {or_nearest(str(name), list(table))}")
 
 
 def listed(names: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ..core.node import Node
 from ..core.traversal import topological
 from ..operations.operation import LEAF, Op, columns
-from ..util.require import require_flag, require_mapping, require_sequence, require_texts, require_whole
+from ..util.require import require_flag, require_kind, require_mapping, require_sequence, require_texts, require_whole
 
 Text = tuple[str, int]  # a formula, and how strongly it binds, as in the table of operations
 Side = Node | Sequence[Sequence[Node]]  # of a statement: a node, or a matrix by rows
@@ -95,8 +95,7 @@ class Formulas:
         called = require_texts("names", called)
         nodes = require_sequence("nodes", nodes, "nodes", Node)
         require_sequence("outputs", require_mapping("outputs", outputs, "name: node").values(), "nodes", Node)
-        if not isinstance(notation, Notation):
-            raise TypeError(f"notation must be a Notation, got {type(notation).__name__}: {notation!r:.60}")
+        require_kind("notation", notation, Notation)
         self.outputs, self.notation = outputs, notation
         self.places = {node: k for k, node in enumerate(nodes)}
         taken = Counter([node.name for node in nodes if node.name])
@@ -116,6 +115,7 @@ class Formulas:
 
     def lines(self, ends: Sequence[Node], most: int = LINES) -> Lines:
         """The lines of the ends and of what they need, those nearest to the ends where there are too many."""
+        ends = require_sequence("ends", ends, "nodes", Node)
         queue = list(dict.fromkeys([*ends, *self._needed(ends)]))
         most = require_whole("lines", most, 1)
         kept = sorted(queue[:most], key=self.places.__getitem__)

@@ -25,8 +25,8 @@ LABELS = ("tags", "roles", "lines")
 def to_networkx(graph: Graph) -> networkx.MultiDiGraph:
     """The graph as one of networkx, from arguments to uses.
 
-    Nodes have the attribute op; name, value and input (its place) if any; tags, roles, lines and outputs as JSON. Edges
-    have a slot. So all attributes are texts and numbers, as files of GraphML and GEXF have them.
+    Nodes have the attribute op; name, number and input (its place) if any; tags, roles, lines and outputs as JSON.
+    Edges have a slot. So all attributes are texts and numbers, as files of GraphML, GEXF, GML and JSON have them.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def to_networkx(graph: Graph) -> networkx.MultiDiGraph:
         named.setdefault(node, {})[name] = place
     for node in dict.fromkeys((*nodes, *inputs)):
         number[node] = len(number)
-        there = {"name": node.name, "value": node.value, "input": places.get(node)}
+        there = {"name": node.name, "number": node.value, "input": places.get(node)}
         result.add_node(
             number[node],
             op=node.op.name,
@@ -118,9 +118,12 @@ def from_networkx(network: networkx.DiGraph) -> Graph:
     for key in order:
         read = partial(_read, key, network.nodes[key])
         op, name = read("op", str), read("name", _name, None)
+        cytoscape = "id" in network.nodes[key]  # whose JSON names all nodes, and has a value of its own
+        name = None if cytoscape and name == network.nodes[key]["id"] else name
         if op not in (CONSTANT.name, VARIABLE.name, *OPS):
             raise GraphError(f"operation {op!r} of node {key!r} is not in the table: register its row first")
-        value = read("value", float) if op == CONSTANT.name else None
+        before = "value" in network.nodes[key] and not cytoscape  # as files of version 0.1 have it
+        value = read("value" if before else "number", float) if op == CONSTANT.name else None
         if op == VARIABLE.name:
             inputs[read("input", int)] = read("name", _name)
         slots = {_read(key, data, "slot", int): number[source] for source, _, data in network.in_edges(key, data=True)}
@@ -141,7 +144,7 @@ def from_networkx(network: networkx.DiGraph) -> Graph:
 
 def _read(key: object, data: Mapping[str, Any], name: str, kind: Callable[[Any], Any], default: object = ...) -> Any:
     """An attribute of a node or of an edge to it."""
-    if name not in data:
+    if data.get(name, []) == []:  # what networkx makes of "[]" in GML
         if default is ...:
             raise GraphError(f"node {key!r} has no attribute {name!r}, which to_networkx gives it or its edges")
         return default

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph._shared import Array, HoldsNodes, real_array, real_number
+from cgraph._shared import Array, HoldsNodes, is_function, real_array, real_number
 
 from ..systems.controller import with_closed_form
 from ..systems.model import Equations, Model, as_equations
@@ -53,7 +53,7 @@ class SampledController(HoldsNodes):
     period: float
 
     def __post_init__(self) -> None:
-        if not callable(self.function) or isinstance(self.function, type):
+        if not is_function(self.function):
             raise TypeError(f"a controller must be a function of (q, qd, t), got {self.function!r:.60}")
         if not 0.0 < real_number("period", self.period) < math.inf:
             raise ValueError(f"the period of a controller must be positive and finite, got {self.period!r} s")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Array, HoldsNodes, floats, kept_by_first, real_number
+from cgraph._shared import Array, HoldsNodes, floats, kept_by_first, real_number, require_kind
 
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import initial_values, other_inputs, start_state
@@ -324,8 +324,7 @@ class Run(HoldsNodes):
         """The run with these values of parameters built in, but for those that stay open."""
         if parameters is None:
             return self
-        if not isinstance(parameters, Mapping):
-            raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
+        require_kind("parameters", parameters, Mapping, "a mapping of names to numbers")
         values = {name: parameter_value(name, each) for name, each in parameters.items() if name not in self._varied}
         key = tuple([(name, value.hex()) for name, value in values.items()])  # which tells 0.0 and -0.0 apart
         found: Run = self._made(key, partial(replace, self, _parameters=values)) if values else self

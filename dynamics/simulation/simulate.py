@@ -8,7 +8,7 @@ from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from cgraph._shared import or_nearest, require_choice, require_flag, require_sequence
+from cgraph._shared import is_function, or_nearest, require_choice, require_flag, require_sequence
 
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
@@ -153,11 +153,11 @@ def _run(model: Model, method: str, tau: Tau, events: Any, options: Mapping[str,
     steps, sampled = Steps(method, **known_options(plain)), isinstance(tau, SampledController)
     if names and sampled:
         raise ValueError(f"varied = {names} cannot be with a SampledController, which holds its forces")
-    if unknown := [name for name in names if name not in equations.parameters and not callable(tau)]:
+    if unknown := [name for name in names if name not in equations.parameters and not is_function(tau)]:
         known = or_nearest(unknown[0], list(equations.parameters))
         raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
     if steps.estimate_error and sampled:
         raise ValueError("estimate_error cannot be with a SampledController: run again with half of dt and compare")
-    if not (sampled or callable(tau) or isinstance(tau, float)):  # a number is checked with the start
+    if not (sampled or is_function(tau) or isinstance(tau, float)):  # a number is checked with the start
         other_inputs(equations, tau)
     return Run(model, steps, tau, as_events(events), form, dense, names)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, _shared
-from cgraph._shared import Array, counted, or_nearest
+from cgraph._shared import Array, counted, entry, real_array, require_kind
 
 from ..integrators import METHODS
 from .applied_force import HeldForces
@@ -150,6 +150,7 @@ class Sides(NamedTuple):
 
     def at(self, times: Array) -> Array:
         """The sides at the rows of a run, (T, n); at the first of two rows of one instant, of a reset, those before."""
+        times = real_array("times", times).ravel()
         way = -1.0 if self.t[-1] < self.t[0] else 1.0
         after, before = (np.searchsorted(way * self.t, way * times, side) - 1 for side in ("right", "left"))
         twice = np.append(times[1:] == times[:-1], False)
@@ -224,17 +225,15 @@ class Trajectory:
         ValueError
             For a name that no column has.
         """
-        if not isinstance(name, str):
-            raise TypeError(f"a column of a trajectory has a name, got {type(name).__name__}: {name!r:.60}")
+        require_kind("the name of a column", name, str, "a string")
         kinds = ("qd", "qdd", "tau", "forces") if self.p is None else ("qd", "qdd", "tau", "forces", "p")
         known = {"q": self.coordinates} | dict.fromkeys(kinds, self.velocities)
         places = {f"{kind}.{each}": (kind, i) for kind, names in known.items() for i, each in enumerate(names)}
         by_number = {f"{kind}{i}": (kind, i) for kind, names in known.items() for i in range(len(names))}
         states = {} if self.velocities else {each: ("q", i) for i, each in enumerate(self.coordinates)}
-        if (place := (by_number | places | states).get(name)) is None:
-            raise ValueError(f"the trajectory has no column {name!r:.80}; {or_nearest(name, [*states, *places])}")
-        table: Array = getattr(self, place[0])
-        return table[:, place[1]]
+        kind, i = entry("the trajectory has no column", states | places | by_number, name)
+        table: Array = getattr(self, kind)
+        return table[:, i]
 
     def solution(self, t: ArrayLike) -> tuple[Array, Array]:
         """The motion at any time of the run, by the dense output of its steps.

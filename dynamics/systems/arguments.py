@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import check_name, formulating, is_finite, or_nearest, real_number, require_mapping
+from cgraph._shared import check_name, formulating, is_finite, is_function, or_nearest, real_number, require_mapping
 from cgraph.extend import topological
 
 TIME = "t"
@@ -118,7 +118,7 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
     Raises TypeError, naming `what`, for what is no such function.
     """
     names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else f"({state}, t) or ({state}, t, p)"
-    if not callable(function):
+    if not is_function(function):
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
     for chosen, last in ((arguments, "p"), (arguments[:-1], "t")):
         if _takes(function, len(chosen)) and not _keeps(function, len(chosen) - 1, last):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import memo, or_nearest
+from cgraph._shared import is_function, memo, or_nearest
 from cgraph.extend import topological
 
 from .arguments import Parameters, parameters_of
@@ -114,7 +114,7 @@ def with_closed_form(model: Equations, tau: Any, parameters: object) -> tuple[Eq
     tau: a controller in closed form, or the constant force.  parameters: of the run, {name: value}; those that the
     model does not have are the controller's.
     """
-    if not callable(tau):
+    if not is_function(tau):
         return model, tau, None if model.system is None else model.system.tau
     given = parameters if isinstance(parameters, Mapping) else {}
     closed = controlled(model, tau, {name: 0.0 for name in given if name not in model.parameters})

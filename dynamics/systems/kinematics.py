@@ -7,7 +7,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import is_finite
+from cgraph._shared import is_finite, is_function, require_kind
 from cgraph.extend import Builder, building, cotangents, folded, tangents, topological
 
 from .arguments import names_of, node_or_number, require_known, sequence
@@ -47,8 +47,7 @@ class Kinematics:
     def __init__(self, coordinates: Sequence[str] | str, quasi: QuasiVelocities | None = None) -> None:
         self.coordinates = names_of("a system", "coordinate", coordinates)
         self.quasi = quasi
-        if quasi is not None and not isinstance(quasi, QuasiVelocities):
-            raise TypeError(f"quasi_velocities must be QuasiVelocities, got {type(quasi).__name__}: {quasi!r:.60}")
+        require_kind("quasi_velocities", quasi, QuasiVelocities | None, "QuasiVelocities")
         self.velocities = self.coordinates if quasi is None else names_of("a system", "velocity", quasi.names)
         if len(self.velocities) > len(self.coordinates):
             raise ValueError(f"{len(self.coordinates)} coordinates cannot have {len(self.velocities)} velocities")
@@ -153,7 +152,7 @@ class Kinematics:
             raise ValueError("rate is not finite about the neutral coordinates: give others, where it can be compared")
 
     def _called(self, what: str, function: Function, count: int, *arguments: Sequence[Node]) -> list[Node]:
-        if not callable(function):
+        if not is_function(function):
             raise TypeError(f"{what} must be a function, got {function!r:.60}")
         given = sequence(f"{what} must give", function(*arguments))
         if len(given) != count:

@@ -103,8 +103,7 @@ class System(HoldsNodes):
         velocity_constraints: Callable[..., object] | None = None,
         body_terms: BodyTerms | None = None,
     ) -> None:
-        if not isinstance(body_terms, BodyTerms | None):
-            raise TypeError(f"body_terms must be BodyTerms, got {type(body_terms).__name__}: {body_terms!r:.60}")
+        _shared.require_kind("body_terms", body_terms, BodyTerms | None, "BodyTerms")
         self.kinematics, self.body_terms = Kinematics(coordinates, quasi_velocities), body_terms
         self.coordinates, self.velocities = self.kinematics.coordinates, self.kinematics.velocities
         self.q, self.qd = self.kinematics.q, self.kinematics.u

@@ -104,8 +104,7 @@ def to_dot(
     if not isinstance(legend, Mapping):
         _shared.require_flag("legend", legend)
     for what, text in (("caption", "" if caption is None else caption), ("marked_label", marked_label)):
-        if not isinstance(text, str):
-            raise TypeError(f"{what} must be text, got {type(text).__name__}: {text!r:.60}")
+        _shared.require_kind(what, text, str, "text")
     plan = Plan(
         graph,
         _shared.require_texts("names", names),

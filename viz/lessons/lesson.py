@@ -8,7 +8,7 @@ from html import escape
 from typing import NamedTuple
 
 from cgraph import Graph
-from cgraph._shared import require_choice, write_files
+from cgraph._shared import require_choice, require_kind, write_files
 from dynamics.scenes.scenes import names
 from dynamics.systems.model import Model
 
@@ -109,8 +109,7 @@ def lesson(
     chosen = LESSONS[require_choice("subject", subject, LESSONS)]
     require_choice("form", form, FORMS)
     for what, given in (("title", title), ("author", author)):
-        if not isinstance(given, str):
-            raise TypeError(f"{what} must be text, got {type(given).__name__}: {given!r:.60}")
+        require_kind(what, given, str, "text")
     if isinstance(model, Graph):
         raise TypeError("a lesson is about a System, a Mechanism or a Scene; viz.page(graph) is the page of a cg.Graph")
     check_can_draw(png=False)

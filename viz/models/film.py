@@ -99,8 +99,7 @@ def animate(
         require_film(target)
         _shared.check_writable(target)
     check_can_plot()
-    if not isinstance(title, str):
-        raise TypeError(f"title must be text, got {type(title).__name__}: {title!r:.60}")
+    _shared.require_kind("title", title, str, "text")
     model = scenes.of_model(model)
     known = _motions(model, motions)
     wrong = _shared.require_sequence("marked", marked, "words of motions", str)

@@ -29,7 +29,7 @@ class CNumbers:
     unit: float  # the largest relative error of a rounding
 
     def stored(self, value: float) -> float:
-        """The number as the program has it; a constant too small to be there is the smallest one, not 0.
+        """The number as the program has it; a constant too small to be there is the smallest normal one, not 0.
 
         Raises ValueError for a number that is too large.
         """
@@ -39,7 +39,7 @@ class CNumbers:
             near = float(np.float32(value))
         if math.isinf(near):
             raise ValueError(f"the constant {value!r} is beyond float32, whose largest number is 3.4e38")
-        return near if near or not value else math.copysign(float(np.finfo(np.float32).smallest_subnormal), value)
+        return near if near or not value else math.copysign(float(np.finfo(np.float32).tiny), value)
 
     def text(self, value: float) -> str:
         """The number, exactly; in parentheses if it has a sign."""

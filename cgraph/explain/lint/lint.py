@@ -12,7 +12,7 @@ from ...core.label import PRIMAL
 from ...core.node import Node
 from ...operations.table import FLAT
 from ...util.json_type import Json
-from ...util.require import require_graph, require_mapping, require_sequence
+from ...util.require import require_graph, require_kind, require_mapping, require_sequence
 from ...util.words import counted
 from ..edge_partials import Point
 from ..names import Name, Names, joined
@@ -152,8 +152,7 @@ def lint(
     require_graph("lint", graph)
     if isinstance(digits, bool) or not isinstance(digits, (int, float)) or not digits > 0.0:
         raise ValueError(f"digits must be a positive number, got {digits!r:.60}")
-    if not isinstance(function, str):
-        raise TypeError(f"function must be the name of one, got {type(function).__name__}: {function!r:.60}")
+    require_kind("function", function, str, "the name of one")
     known = Names(graph, names)
     findings = _guards_by_equality(known)
     proofs: list[str] = []

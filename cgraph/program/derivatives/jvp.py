@@ -13,7 +13,7 @@ from ...core.graph import Graph
 from ...core.node import Node
 from ...simplification.simplify import simplify
 from ...util.caches import kept_by_first
-from ...util.require import require_sequence
+from ...util.require import require_kind, require_sequence
 from ..program import Program, unused_sign
 from ..statement import Names, Statement, effects, length_of, names_in, reads_and_writes, row_of, with_names
 from ..statements.call import Map, copied
@@ -147,8 +147,7 @@ class Passes(Registers):
     """
 
     def __init__(self, program: Program, of: Sequence[str], wrt: Sequence[str], constant: Sequence[str] = ()) -> None:
-        if not isinstance(program, Program):
-            raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
+        require_kind("program", program, Program)
         if controls := [name for name in ("record_if", "stop") if getattr(program, name) is not None]:
             raise GraphError(f"a run has derivatives if it does not depend on numbers how long it is: no {controls[0]}")
         for what, names in (("of", of), ("wrt", wrt), ("constant", constant)):

@@ -22,7 +22,7 @@ from ...core.scope import without_collection
 from ...util.caches import made_once
 from ...util.explain_failure import explain_failure
 from ...util.memory import aligned
-from ...util.require import require_choice, require_flag
+from ...util.require import require_choice, require_flag, require_kind
 from ..fuse import fused
 from ..program import Program, outliving, whole_graph
 from ..statement import row_of
@@ -166,7 +166,7 @@ class NativeRunner(Runner):
 
     def text(self, x: str) -> str:
         """The text in LLVM's language."""
-        return self.point(x, self.program.record[0])[0]
+        return self.point(require_kind("x", x, str), self.program.record[0])[0]
 
 
 def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from ...codegen.python_function import OnArrays, OnFloats
 from ...core.evaluation import Array
 from ...core.graph import Graph
+from ...util.require import require_kind
 from ..program import Program, whole_graph
 from ..statement import Execution
 from ..statements.call import spread
@@ -124,7 +125,8 @@ class PythonRunner(Runner):
 
     def text(self, x: str) -> str:
         """The text of one graph in Python, or in NumPy; of other programs their listing."""
-        graph, of = whole_graph(self.program, x), self._on_arrays if self._backend == "numpy" else self.on_floats
+        graph = whole_graph(self.program, require_kind("x", x, str))
+        of = self._on_arrays if self._backend == "numpy" else self.on_floats
         return self.program.listing() if graph is None else of(graph).source
 
     def on_floats(self, graph: Graph) -> OnFloats:

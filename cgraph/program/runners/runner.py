@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
 from ...util.memory import require_memory
-from ...util.require import require_mapping, require_whole
+from ...util.require import require_kind, require_mapping, require_whole
 from ..many import many
 from ..program import Program
 from ..writer import offsets
@@ -82,6 +82,7 @@ class Runner(ABC):
         """The register in a memory, a view (length,). Raises GraphError for an unknown one."""
         if not isinstance(name, str) or name not in self._slices:
             raise GraphError(f"the program has no register {name!r} (it has {', '.join(self._slices) or 'none'})")
+        require_kind("memory", memory, np.ndarray)
         return memory[self._slices[name]]
 
     def write(self, memory: Array, name: str, value: ArrayLike) -> None:

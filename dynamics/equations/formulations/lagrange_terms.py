@@ -12,7 +12,7 @@ from typing import NamedTuple
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import require_choice
-from cgraph.extend import TANGENT, Builder, building, cotangents, folded, topological
+from cgraph.extend import TANGENT, Builder, building, cotangents
 
 from ...systems.kinematics import ONE, changes, dot
 from ...systems.model import Model, as_system
@@ -39,10 +39,7 @@ class LagrangeTerms(NamedTuple):
 
 def chain_rule(system: System) -> LagrangeTerms:
     """Section 3: d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, one forward."""
-    lagrangian, build = system.lagrangian, Builder()
-    if any([node.op.name == "hypot" for node in topological([lagrangian])]):  # whose square is smooth once it is folded
-        (lagrangian,) = folded([lagrangian], build)
-    momentum, rate, gradient = lagrange_sweeps(system, lagrangian, build)
+    momentum, rate, gradient = lagrange_sweeps(system, system.lagrangian, Builder())
     return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
 
 

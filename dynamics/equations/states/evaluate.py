@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Compiled, Graph
-from cgraph._shared import Array, kept_by_first, real_array
+from cgraph._shared import Array, kept_by_first, real_array, require_kind
 
 from ...systems.arguments import TIME, finite_time
 from ...systems.model import Model, as_system
@@ -73,8 +73,7 @@ def arrays_at(
     [[2.666666666667, 0.833333333333], [0.833333333333, 0.333333333333]]
     """
     function, graph = (graph, graph.graph) if isinstance(graph, Compiled) else (None, graph)
-    if not isinstance(graph, Graph):
-        raise TypeError(f"graph must be a Graph, such as mass_matrix(model), got {type(graph).__name__}: {graph!r:.60}")
+    require_kind("graph", graph, Graph, "a Graph, such as mass_matrix(model)")
     system, state = as_system(model), {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
     known = {*system.q, *system.qd, *system.qdd, *system.tau, system.t, *system.extra_inputs}
     if unknown := [node.name for node in graph.inputs if node not in known]:

@@ -226,7 +226,7 @@ class Task:
         """Trajectories in a chunk: as asked for, or the shares of workers; in lanes whole vectors."""
         if chunk is None:
             shares = 1 if 0 < self._many * self._steps <= SHORT else SHARES
-            shares *= workers if isinstance(workers, int) else UNKNOWN
+            shares *= min(workers, self._many) if isinstance(workers, int) else UNKNOWN
             most = LARGEST_CHUNK if stored or not self.largest else self.largest
             chunk = min(math.ceil(self._many / shares), most)
         return math.ceil(min(chunk, self.largest) / VECTOR) * VECTOR if self.largest else chunk

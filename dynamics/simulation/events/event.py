@@ -10,7 +10,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array, HoldsNodes, check_name, columns
+from cgraph._shared import Array, HoldsNodes, check_name, columns, is_function, require_kind
 from cgraph.extend import Builder, building, topological
 
 from ...equations.substitute import substitute
@@ -75,14 +75,13 @@ class Event(HoldsNodes):
     reset: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
-        is_function = [callable(each) and not isinstance(each, type) for each in (self.value, self.reset)]
-        if not isinstance(self.name, str) or not is_function[0] or not isinstance(self.terminal, bool):
+        if not isinstance(self.name, str) or not is_function(self.value) or not isinstance(self.terminal, bool):
             got = f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
             raise TypeError(f"an event needs a name, a function, and True or False for `terminal`, got {got}")
         check_name("an event", self.name)
         if not isinstance(self.direction, (int, np.integer)) or self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
-        if self.reset is not None and not is_function[1]:
+        if self.reset is not None and not is_function(self.reset):
             raise TypeError(f"event {self.name!r}: reset must be a function, got {self.reset!r:.40}")
         if self.reset is not None and self.terminal:
             raise ValueError(f"event {self.name!r}: a run that ends there goes on from no reset state; leave out one")
@@ -92,8 +91,7 @@ def as_events(events: Event | Iterable[Event]) -> tuple[Event, ...]:
     """One event or several, as a tuple. Raises TypeError for anything else, ValueError for two of one name."""
     several = (events,) if isinstance(events, Event) else tuple(sequence("events must be", events))
     for k, event in enumerate(several):
-        if not isinstance(event, Event):
-            raise TypeError(f"events must be of the type Event, got {type(event).__name__}: {event!r:.60}")
+        require_kind("events", event, Event, "of the type Event")
         if event.name in [other.name for other in several[:k]]:
             raise ValueError(f"two events have the name {event.name!r}")
     return several

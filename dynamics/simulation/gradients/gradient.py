@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array, kept_by_first
+from cgraph._shared import Array, entry, kept_by_first
 
 from ...systems.model import Model
 from ..applied_force import Constant
@@ -66,8 +66,8 @@ class MotionGradient:
     checkpoints: int
 
     def __getitem__(self, name: str) -> Any:
-        """The gradient by one of `wrt`. Raises KeyError for another name."""
-        return self.gradients[name]
+        """The gradient by one of `wrt`. Raises ValueError for another name."""
+        return entry("there is no gradient by", self.gradients, name)
 
 
 def gradient(
@@ -307,8 +307,8 @@ class Sensitivities:
     times: dict[str, Array]
 
     def __getitem__(self, name: str) -> Array:
-        """The derivatives by one of `wrt`. Raises KeyError for another name."""
-        return self.derivatives[name]
+        """The derivatives by one of `wrt`. Raises ValueError for another name."""
+        return entry("there is no derivative by", self.derivatives, name)
 
 
 def sensitivities(

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array, kept_by_first, memo, or_nearest, real_array, require_sequence
+from cgraph._shared import Array, entry, is_function, kept_by_first, memo, real_array, require_sequence
 from cgraph.extend import Builder, topological
 
 from ...equations.state_equation import FORMS, StateInputs, state_inputs
@@ -304,10 +304,10 @@ class Differentiation:
             cause = "a SampledController calls Python, which has no derivative"
             raise TypeError(f"tau must be numbers or a controller in closed form: {cause}")
         self._losses, self._parameters, self._wrt, self._events = losses, parameters, wrt, as_events(events)
-        self._many, self._closed, self._form = many, callable(tau), options.pop("form", FORMS[0])
+        self._many, self._closed, self._form = many, is_function(tau), options.pop("form", FORMS[0])
         own = _with_loss_parameters(as_equations(model), parameters, *losses)
         t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
-        rows = None if callable(tau) else real_array("tau", tau)
+        rows = None if is_function(tau) else real_array("tau", tau)
         rows = rows if rows is not None and rows.ndim == 2 + many else None
         if method is None:
             method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
@@ -362,8 +362,7 @@ class Differentiation:
         names = [self._wrt] if isinstance(self._wrt, str) else require_sequence("wrt", self._wrt, "names")
         known = dict.fromkeys([*usual, *inputs.parameters])
         for name in names:
-            if not isinstance(name, str) or name not in known:
-                raise ValueError(f"wrt: the motion has no input {name!r:.60} ({or_nearest(str(name), list(known))})")
+            entry("wrt: the motion has no input", known, name)
             if name in usual and name in inputs.parameters:
                 both = "the start or the applied force, and a parameter"
                 raise ValueError(f"wrt {name!r} is {both}: rename the parameter")

@@ -137,7 +137,7 @@ def begin(t: Node, t_end: Node, first: Node, wish: Node, longest_step: Node) -> 
         "t0": t,
         "length": length,
         "toward": cg.where(t_end > t, 1.0, -1.0),
-        "least": cg.minimum(length, cg.maximum(2.0 * RESOLUTION * abs(t), math.ulp(0.0))),
+        "least": cg.minimum(length, cg.maximum(2.0 * RESOLUTION * abs(t), 2.0**-1022)),
         "h_first": h_first,
         "h_look": cg.where(first, first, h_first),
         "look": 1.0,

@@ -144,9 +144,6 @@ def test_a_matrix_that_is_not_positive_definite_is_told():
 
 def test_what_cannot_be_is_said():
     x, y = cg.variables("x y")
-    graph = cg.Graph([x, y], {"f": x * x + y * y})
-    with pytest.raises(ValueError, match="order must be one of recursive, balanced, got 'parallel'"):
-        cg.hessian_solve(graph, [x, y], [1.0, 1.0], order="parallel")
     with pytest.raises(ValueError, match='order "balanced" needs a function without multipliers'):
         solve_nodes(x * x + x * y, [x, y], [x, y], multipliers=[y], order="balanced")
 

@@ -1,5 +1,6 @@
 """What a function of another library has in common with the graph that it was made of."""
 
+import math
 from collections.abc import Callable
 from contextlib import contextmanager
 from typing import Any, NamedTuple
@@ -66,8 +67,8 @@ def agrees(bridge: Bridge, case: Case) -> None:
 @contextmanager
 def own_row(**columns: Any):
     """A row of a program's own, in the table for as long as the block takes; gives a graph that has it."""
-    register(Op("own", 1, lambda x: x * x + 1.0, columns.pop("array", lambda x: x * x + 1.0), lambda y, x: (2.0 * x,),
-                samples=((0.3,),), **columns))  # fmt: skip
+    square = {"scalar": lambda x: x * x + 1.0, "array": lambda x: x * x + 1.0, "partials": lambda y, x: (2.0 * x,)}
+    register(Op("own", 1, samples=((0.3,),), **(square | columns)))
     try:
         yield cg.Graph([x], {"y": apply(OPS["own"], x)})
     finally:
@@ -90,5 +91,6 @@ def refuses(make: Callable[[cg.Graph], Any], library: str) -> None:
         make(graph)
     with own_row(operator=lambda x: x * x + 1.0) as graph:
         assert np.array(make(graph)(np.array([0.5]))).ravel() == pytest.approx([1.25], rel=1e-6)
-    with own_row(array=np.arcsinh) as graph:
+    asinh = {"scalar": math.asinh, "array": np.arcsinh, "partials": lambda y, x: (1.0 / cg.hypot(1.0, x),)}
+    with own_row(**asinh) as graph:
         assert np.array(make(graph)(np.array([0.5]))).ravel() == pytest.approx([np.arcsinh(0.5)], rel=1e-6)

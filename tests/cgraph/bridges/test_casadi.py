@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from tests.cgraph.bridges.agreement import ARM, POINT, Bridge, agrees, disagreements, lets_zero_win, refuses
+from tests.cgraph.bridges.agreement import ARM, POINT, SLOPES, Bridge, agrees, disagreements, lets_zero_win, refuses
 from tests.strategies import cases, examples
 from tests.tolerances import EQUATIONS
 
@@ -40,6 +40,26 @@ def test_an_exact_zero_wins_and_halves_go_to_the_even_number():
     assert np.array(cg.to_casadi(graph)([0.0, 2.5])).ravel().tolist() == [2.5, 2.0]
     assert np.array(cg.to_casadi(graph)([1.0, -1.5])).ravel().tolist() == [0.0, -2.0]
     lets_zero_win(BRIDGE)
+
+
+def test_values_are_those_that_are_written_and_slopes_do_not_overflow_on_the_way():
+    x = cg.variable("x")
+    written = {
+        "sum": (x + 1e16) - 1e16,
+        "gone": x - x,
+        "root": cg.sqrt(x) * cg.sqrt(x),
+        "zero": 0.0 * x,
+        "same": cg.equal(x, x),
+    }
+    graph, simplifies = cg.Graph([x], written), casadi.GlobalOptions.getSimplificationOnTheFly()
+    for point in (3.0, np.inf, np.nan):
+        wanted = list(graph.evaluate({"x": point}).values())
+        np.testing.assert_array_equal(np.array(cg.to_casadi(graph)(point)).ravel(), wanted)
+    assert casadi.GlobalOptions.getSimplificationOnTheFly() == simplifies
+    slope = jacobian(cg.Graph([x], {"y": cg.logistic(x)}))
+    for point in (-710.0, -37.0, 0.0, 1.0, 710.0):
+        e = np.exp(-abs(point))
+        assert float(slope(point)) == pytest.approx(e / (1.0 + e) ** 2, rel=SLOPES)
 
 
 def test_an_arm_and_its_jacobian_and_the_names_of_its_function():

@@ -85,6 +85,21 @@ def test_compiled_its_derivatives_of_three_orders_are_those_of_the_graph():
     assert np.allclose(third, (hessian(point + step) - hessian(point - step)) / 2e-6, rtol=1e-7, atol=1e-8)
 
 
+@pytest.mark.parametrize("backend", ["auto", "python"])
+def test_a_force_against_the_speed_has_slopes_at_rest_within_jax_and_afterwards(backend):
+    """The threads of XLA take subnormal numbers for 0."""
+    x, y = cg.variables("x y")
+    speed = cg.hypot(x, y)
+    fn = cg.compile(cg.Graph([x, y], {"fx": -speed * x, "fy": -speed * y}), backend)
+    for derivative in (jax.jacrev, jax.jacfwd):
+        assert (derivative(cg.as_jax(fn))(jnp.zeros(2)) == 0.0).all()
+    assert (fn.jacobian([0.0, 0.0]) == 0.0).all()
+    slopes = cg.to_jax(cg.gradient(cg.Graph([x, y], {"speed": speed})))
+    for kind in (jnp.float32, jnp.float64):
+        assert slopes(jnp.zeros(2, kind)).tolist() == [0.0, 0.0]
+        assert slopes(jnp.array([3.0, 4.0], kind)).tolist() == pytest.approx([0.6, 0.8])
+
+
 def test_what_jax_cannot_take_is_told():
     agreement.refuses(cg.to_jax, "JAX")
     fn = cg.compile(SMALL, "python")

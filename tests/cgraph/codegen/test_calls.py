@@ -1,7 +1,6 @@
 """Calls of a compiled function in every engine: values of every kind, the same sentences, and arrays bound once."""
 
 import gc
-import math
 import pickle
 import subprocess
 import sys
@@ -97,22 +96,6 @@ def test_what_is_no_real_number_is_told_in_the_same_words(function):
             with pytest.raises((TypeError, ValueError), match=sentence):
                 call()
     assert np.array_equal(function([0.0, 2.0, 7.0]), [7.0, 0.0, 7.0])
-
-
-def test_options_and_numbers_of_threads_that_make_no_sense_are_told(backend):
-    for option in ("fast", "fma"):
-        for value in ("no", 1, None):
-            with pytest.raises(TypeError, match=f"{option} must be True or False, got {value!r}"):
-                cg.compile(PAIR, backend, **{option: value})
-        assert cg.compile(PAIR, backend, **{option: np.False_}).options[option] is False
-    for threads in (True, False, 0, -1, 1.5, "2", math.nan):
-        with pytest.raises(
-            ValueError, match="threads must be a whole number from 1, or None for one on each core, got"
-        ):
-            cg.compile(PAIR, backend).batch(np.ones((2, 3)), threads=threads)
-    for cache in (None, 3, "", b"folder", 1.0):
-        with pytest.raises(TypeError, match="cache must be True, False or the path of a folder, got"):
-            cg.compile(PAIR, backend, cache=cache)
 
 
 def test_outputs_share_memory_with_nothing():

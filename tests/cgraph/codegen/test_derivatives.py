@@ -218,8 +218,6 @@ def test_inputs_to_differentiate_by_are_checked(backend):
     for wrt, message in ((["w"], "no input 'w'"), (["x", "x"], "twice"), ([], "at least one")):
         with pytest.raises(GraphError, match=message):
             function.jacobian(POINT, wrt=wrt)
-    with pytest.raises(TypeError, match="wrt must name inputs"):
-        function.vjp(POINT, np.ones(8), wrt=3)
     with pytest.raises(GraphError, match=r"X_dot must have shape \(k, 2\) or \(2,\), got \(4,\)"):
         function.jvp(POINT, np.ones(4), wrt=["x", "y"])
     with pytest.raises(GraphError, match=r"in shape \(8, 2\)"):
@@ -311,8 +309,6 @@ def test_another_shape_is_an_error(backend):
         function.hessian(POINT)
     with pytest.raises(GraphError, match=r"y_bar must have shape \(8,\)"):
         function.hessian(POINT, [1.0])
-    with pytest.raises(TypeError, match="sparse"):
-        function.jacobian(POINT, sparse=1)
 
 
 def test_long_graphs_pass_values_between_functions(monkeypatch):

@@ -112,7 +112,7 @@ def test_to_networkx_has_nodes_and_edges_with_their_attributes():
         "outputs": '{"P": 1}',
     }
     assert found.nodes[number[x]]["name"] == "x"
-    assert [value for _, value in found.nodes(data="value") if value is not None] == [0.5, 9.81, 1.0]
+    assert [value for _, value in found.nodes(data="number") if value is not None] == [0.5, 9.81, 1.0]
 
 
 @settings(max_examples=examples(50))

@@ -1,7 +1,10 @@
 """Derivatives at the points where others give NaN: branches not taken, losers, powers at zero, extreme sizes."""
 
+import ctypes
 import math
-from collections.abc import Callable
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import mpmath
 import pytest
@@ -165,6 +168,47 @@ def test_kinks_that_cancel_leave_the_slopes_of_what_is_smooth(name):
     found, expected = [derivatives(each, 1.0, 1.0) for each in KINKED[name]]
     for order in ("first", "second"):
         assert found[order] == pytest.approx(expected[order], rel=TOLERANCE)
+
+
+@contextmanager
+def flushed_subnormals() -> Iterator[None]:
+    """This thread takes subnormal numbers for 0, as the threads of XLA do and whatever loads -ffast-math."""
+    llvm = pytest.importorskip("llvmlite.binding")
+    instruction = "void @llvm.x86.sse.ldmxcsr(ptr"
+    text = f"declare {instruction})\ndefine void @set(ptr %p) {{ call {instruction} %p) ret void }}"
+    machine = llvm.Target.from_default_triple().create_target_machine()
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(text), machine)
+    load = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_uint32))(engine.get_function_address("set"))
+    load(ctypes.c_uint32(0x9FC0))  # the default, 0x1F80, with "flush to zero" and "denormals are zero"
+    try:
+        yield
+    finally:
+        load(ctypes.c_uint32(0x1F80))
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the register is one of x86")
+@pytest.mark.parametrize("backend", ["auto", "python", "numpy"])
+def test_no_slope_rests_on_a_subnormal_number(backend):
+    x, y = cg.variables("x y")
+    length = cg.hypot(x, y)
+    cg.compile(cg.Graph([x], {"y": x}), backend)  # LLVM is there
+    with flushed_subnormals():
+        assert 5e-324 + x.op.arity == 0.0
+        assert derivatives(cg.hypot, 0.0, 0.0)["first"] == [0.0] * 3
+        force = cg.compile(cg.Graph([x, y], {"fx": -length * x, "fy": -length * y}), backend)
+        assert (force.jacobian([0.0, 0.0]) == 0.0).all()
+        assert (force.jacobian([[0.0, 0.0]]) == 0.0).all()
+    assert (force.jacobian([0.0, 0.0]) == 0.0).all()
+
+
+def test_a_length_times_its_slope_is_smooth_at_the_origin():
+    """Second slopes of half a square, written in several ways; those of other functions are not finite."""
+    x, y = cg.variables("x y")
+    h = cg.hypot(x, y)
+    for square in (0.5 * h**2, h * h / 2, h**2 * 0.25 + h * h * 0.25, 0.5 * (h * h)):
+        found = cg.hessian(cg.Graph([x, y], {"f": square})).evaluate({"x": 0.0, "y": 0.0})
+        assert list(found.values()) == [1.0, 0.0, 0.0, 1.0]
+    assert not math.isfinite(cg.hessian(cg.Graph([x, y], {"f": cg.cos(h)})).evaluate({"x": 0.0, "y": 0.0})["d2f/dxdx"])
 
 
 def test_atan2_at_the_origin_has_no_derivative():

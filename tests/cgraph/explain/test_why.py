@@ -114,14 +114,11 @@ def test_the_branch_not_taken_weighs_nothing():
     [
         (("h", "x"), cg.GraphError, r"is called 'h' \(inputs x, y, z; named nodes a; outputs f, g\)"),
         (("f", "w"), cg.GraphError, "nothing in the graph is called 'w'"),
-        (("f", 3), TypeError, "input is given by its name or itself, got int: 3"),
         (("f", cg.variable("strange")), cg.GraphError, "<node variable strange> is not a node of the graph"),
         (("f", "x", {"x": 1.0}), cg.GraphError, "at: no value for input y, z"),
         (("f", "x", {"x": math.nan, "y": 0.0, "z": 0.0}), ValueError, "input 'x' must be a finite number, got nan"),
         (("f", "x", {"x": "1", "y": 0.0, "z": 0.0}), ValueError, "input 'x' must be a finite number, got '1'"),
         (("f", "x", dict.fromkeys("xyzw", 1.0)), cg.GraphError, "at: the graph has no input w"),
-        (("f", "x", None, -1), ValueError, "k must be a whole number of paths, at least 0, got -1"),
-        (("f", "x", None, 2.0), ValueError, "k must be a whole number"),
         (("f", "a"), cg.GraphError, "2 nodes are called 'a'; give the node itself"),
     ],
 )

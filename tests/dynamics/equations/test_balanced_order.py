@@ -107,5 +107,3 @@ def test_constraints_have_no_balanced_order() -> None:
         ValueError, match="method \"balanced\" needs a system without constraints, got constraint 'rod'"
     ):
         dyn.forward_dynamics(rod, "balanced")
-    with pytest.raises(ValueError, match="method must be one of recursive, balanced, got 'dense'"):
-        dyn.hamilton_equations(dyn.planar_arm([1.0], [1.0]), "dense")

@@ -187,12 +187,8 @@ def test_what_is_wrong_is_said() -> None:
     arm = random_tree(1, "revolute")
     with raises(dyn.MechanismError, match="there is no body 'hand'"):
         dyn.frame_velocity(arm, "hand")
-    with raises(ValueError, match="axes must be"):
-        dyn.frame_velocity(arm, "b0", axes="local")
     with raises(dyn.MechanismError, match=r"the point of body 'b0': at must be \(3,\) finite numbers"):
         dyn.frame_jacobian(arm, "b0", (0.0, 1.0))
-    with raises(ValueError, match="about must be"):
-        dyn.spatial_momentum(arm, "b0")
     with raises(dyn.MechanismError, match="takes rigid bodies"):
         dyn.center_of_mass(dyn.System(lambda q, qd, t: qd[0] ** 2, ["x"]))  # type: ignore[arg-type]
     rotor = dyn.Mechanism([dyn.Body("rotor", dyn.Joint("revolute", armature=1.0))])
@@ -200,5 +196,3 @@ def test_what_is_wrong_is_said() -> None:
         dyn.center_of_mass(rotor)
     with raises(ValueError, match="has the input 'q1', which is no state"):
         dyn.arrays_at(rotor, dyn.energy(random_tree(2, "free")))
-    with raises(TypeError, match="graph must be a Graph"):
-        dyn.arrays_at(arm, "M")  # type: ignore[arg-type]

@@ -183,7 +183,6 @@ def test_deviation_is_told_below_the_rounding_of_the_reference() -> None:
         ({"t_eval": []}, "t_eval must be increasing times from 0 s on"),
         ({"t_eval": [1.0, 1.0]}, "t_eval must be increasing"),
         ({"parameters": {"k": 1.0}}, r"the system has no parameter k \(it has none\)"),
-        ({"digits": 0}, "digits must be a whole number"),
         ({"tau": [1.0, 2.0]}, "tau needs one number"),
     ],
 )

@@ -387,7 +387,7 @@ def test_what_is_not_there_is_said_in_a_sentence() -> None:
 
     with raises(TypeError, match="SampledController calls Python"):
         end(tau=dyn.SampledController(lambda q, qd, t: q, 0.1))
-    with raises(ValueError, match=r"wrt: the motion has no input 'mass' \(it has q, qd, tau, m, k\)"):
+    with raises(ValueError, match=r"wrt: the motion has no input 'mass'; it has q, qd, tau, m, k"):
         end(wrt="mass")
     with raises(ValueError, match=r"tau must have shape \(n,\) or \(steps, n\) with n = 1"):
         end(tau=np.zeros((2, 3)))

@@ -141,16 +141,8 @@ Q = np.zeros((4, 2))
         (Q, Q, {"method": "dopri5"}, "'dopri5' chooses the steps of each trajectory: t_eval must say"),
         (Q, Q, {"dt": 0.0}, "dt must be positive and finite, got 0.0 s"),
         (Q, Q, {"rtol": -1.0}, "rtol and atol must be finite"),
-        (Q, Q, {"max_steps": 0}, "max_steps must be a whole number, at least 1, or infinite, got 0"),
         (Q, Q, {"t_eval": [0.5, 0.2]}, "t_eval must be increasing times"),
         (Q, Q, {"dt": 1e-13}, r"4 trajectories of 9999999999991 rows of 4 numbers take 1.19e\+06 GiB, and .* free"),
-        (Q, Q, {"chunk": 0}, "chunk must be a whole number from 1, got 0"),
-        (
-            Q,
-            Q,
-            {"workers": 0},
-            "workers must be a whole number from 1, None for one on each core, an executor or a function",
-        ),
         (
             Q,
             Q,

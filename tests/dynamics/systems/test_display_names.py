@@ -83,8 +83,6 @@ def test_columns_of_a_trajectory_have_names():
             assert run[f"{kind}.{name}"].tolist() == run[f"{kind}{i}"].tolist() == table[:, i].tolist()
     with pytest.raises(ValueError, match=r"did you mean 'q\.ankle'"):
         run["q.ankel"]
-    with pytest.raises(TypeError, match="a column of a trajectory has a name"):
-        run[0]
     decay = dyn.simulate(dyn.OdeSystem(lambda x, t: [-x[0]], ["level"]), [1.0], None, 0.1, "rk4", dt=0.1)
     assert decay["level"].tolist() == decay.q[:, 0].tolist()
 

@@ -57,30 +57,10 @@ def test_an_svg_is_one_element_of_a_drawing_or_of_its_source() -> None:
     assert f'font-family="{theme.FONT_FAMILIES}"' in svg  # what a browser without the font takes
 
 
-NAN = float("nan")
-WRONG: dict[str, tuple[Callable[[], object], type[Exception], str]] = {
-    "engine": (
-        lambda: render_svg("digraph {}", engine="magic"),
-        ValueError,
-        "engine must be one of dot, .* got 'magic'",
-    ),
-    **{
-        f"timeout {t}": (lambda t=t: render_svg("digraph {}", timeout=t), ValueError, "timeout must be positive")
-        for t in (0.0, -1.0, NAN)
-    },
-    **{
-        f"scale {k}": (lambda k=k: render_png("<svg/>", scale=k), ValueError, "scale must be positive and finite")
-        for k in (0.0, -1.0, float("inf"), NAN)
-    },
-    **{text: (lambda text=text: render_png(text), RenderError, "not an SVG picture") for text in ("", "hello", "<svg")},
-}
-
-
-@each_row("what", WRONG)
-def test_what_makes_no_sense_is_refused(what: str) -> None:
-    call, error, words = WRONG[what]
-    with pytest.raises(error, match=words):
-        call()
+@each_row("text", ["", "hello", "<svg"])
+def test_what_is_no_picture_is_refused(text: str) -> None:
+    with pytest.raises(RenderError, match="not an SVG picture"):
+        render_png(text)
 
 
 @each_row("engine", ["dot", "sfdp", "neato"])
