@@ -163,6 +163,11 @@ class _Checks:
         return self.matrix(mass_matrix(self.system))
 
     @cached_property
+    def rate_terms(self) -> Array:
+        """|M| times the largest velocity, (N, n, n): size of the terms of dM/dt, which cancel where M is constant."""
+        return np.abs(self.inertia) * np.abs(self.at["qd"]).max(axis=1)[:, None, None]
+
+    @cached_property
     def admitted(self) -> Array:
         """M of the motions that constraints admit."""
         return self.held.admitted(self.inertia)
@@ -211,7 +216,8 @@ class _Checks:
         # Bodies state their bias by Newton and Euler; the chain rule asks nothing but the Lagrangian.
         still, pushed = self.value(inverse_dynamics(self.system, "chain_rule"), qdd=None), self.pushed
         equation = "bias = inverse dynamics at qdd = 0, without damping and forces"
-        yield rounded(equation, self.bias - still - pushed, np.abs(still) + np.abs(pushed))
+        terms = (self.rate_terms @ np.abs(self.at["qd"])[..., None])[..., 0] + np.abs(still) + np.abs(pushed)
+        yield rounded(equation, self.bias - still - pushed, terms)
         yield self._forward()
         yield self._power()
         yield self._energy()
@@ -229,15 +235,13 @@ class _Checks:
         """Residuals of a Lagrangian that is quadratic in the velocities."""
         matrix = self.matrix(coriolis(self.system))
         qd = self.at["qd"]
-        terms = np.abs(matrix) @ np.abs(qd)[..., None]
+        terms = (np.abs(matrix) + self.rate_terms) @ np.abs(qd)[..., None]
         force = (matrix @ qd[..., None])[..., 0]
         off, size = force + self.gravity - self.bias, terms[..., 0] + np.abs(self.gravity)
         yield rounded("coriolis: C qd + gravity = bias", off, size)
         if self.moves and not self.timed:
             rate = self.matrix(self.rate(mass_matrix(self.system)))
-            skew = rate - 2.0 * matrix
-            # What does not change at a state is a sum of products that cancel: only others show how large these are.
-            terms = np.broadcast_to((np.abs(rate) + np.abs(matrix)).max(axis=0), rate.shape)
+            skew, terms = rate - 2.0 * matrix, np.abs(rate) + np.abs(matrix) + self.rate_terms
             yield rounded("coriolis: dM/dt - 2 C is skew", skew + np.swapaxes(skew, 1, 2), terms)
         yield self._sum("motion: torques by motion add up to tau", torque_by_joint_motion(self.system))
 
