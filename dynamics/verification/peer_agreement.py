@@ -130,6 +130,7 @@ class Original:
 
     def __init__(self, mj: MjModel, q_order: Sequence[int], order: Sequence[int]) -> None:
         self.mj, self.q_order, self.order = mj, list(q_order), list(order)
+        mj.body_sameframe[:] = 0  # by itself MuJoCo takes frames that are less than 1e-6 apart for one
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
