@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -45,6 +46,8 @@ def failed(found: Certificate) -> dict[str, str]:
 
 PASSING = {name: partial(dyn.scenes.load, name) for name in dyn.scenes.names()} | MODELS
 PASSING |= {"welded": lambda: FAMILIES["welded"](5)}
+FORCE = {"forces": [dyn.Force("b2", (1.0, 2.0, "f"))], "parameters": {"f": 3.0}}  # which peers are not asked for
+PASSING |= {"pushed": lambda: replace(FAMILIES["serial"](3), **FORCE)}
 
 
 @each_row("name", PASSING)
@@ -76,12 +79,12 @@ def test_every_kind_of_constraint_passes_and_a_wrong_one_is_found(name: str, mon
     monkeypatch.setattr(Constraints, "rate_changes", lambda *a: [1.001 * node + 0.001 for node in changes(*a)])
     assert set(failed(certify(model, 2))) >= {"constraints: J qdd + (dz/dt at qdd = 0) = 0, all rows"}
     monkeypatch.undo()
-    monkeypatch.setattr(accelerations, "multiplier_outputs", lambda *a: doubled(multiplier_outputs(*a)))
+    monkeypatch.setattr(accelerations, "multiplier_outputs", lambda *a: scaled(multiplier_outputs(*a), 2.0))
     assert set(failed(certify(model, 2))) >= {"inverse dynamics of forward dynamics = tau + J^T lambda"}
 
 
-def doubled(nodes: dict[str, cg.Node]) -> dict[str, cg.Node]:
-    return {name: 2.0 * node for name, node in nodes.items()}
+def scaled(nodes: Mapping[str, cg.Node], factor: float) -> dict[str, cg.Node]:
+    return {name: factor * node for name, node in nodes.items()}
 
 
 def test_loops_are_those_of_pinocchio() -> None:
@@ -90,6 +93,7 @@ def test_loops_are_those_of_pinocchio() -> None:
         found = certify(model, 3)
         assert failed(found) == {}
         assert [each.value < 1e-11 for each in found.residuals if "constraintDynamics" in each.equation] == [True]
+        assert "inverse dynamics = Pinocchio's" in [each.equation for each in found.residuals]
 
 
 @pytest.mark.filterwarnings("ignore::dynamics.ConstraintWarning")
@@ -119,14 +123,12 @@ def test_states_of_a_linkage_are_no_singular_positions(monkeypatch: pytest.Monke
         states = random_states(system, 5, 0.0, 1.0, np.random.default_rng(seed))
         assert min(new_rows(system, q, 0.0) for q in states["q"]) > 0.05
     assert failed(certify(linkage, 3)) == {}
-    monkeypatch.setattr(certificate, "state_space", lambda system: scaled(dyn.state_space(system), 1.0 + 1e-6))
+    right = dyn.state_space(system)
+    wrong = cg.Graph(right.inputs, scaled(right.outputs, 1.0 + 1e-6))
+    monkeypatch.setattr(certificate, "state_space", lambda system: wrong)
     assert [each.split(" along")[0] for each in failed(certify(linkage, 3))] == [
         "derivatives: A and B of the linearization"
     ]
-
-
-def scaled(graph: cg.Graph, factor: float) -> cg.Graph:
-    return cg.Graph(graph.inputs, {name: node * factor for name, node in graph.outputs.items()})
 
 
 @pytest.mark.filterwarnings("ignore::dynamics.ConstraintWarning")
@@ -193,9 +195,7 @@ def wheels() -> dyn.Mechanism:
 def test_terms_that_cancel_are_measured_by_the_inertia_that_moves(model: dyn.Mechanism, speed: float) -> None:
     """Such as sums of squares of sines and cosines, of which a constant M is made."""
     for seed in (0, 8, 12):
-        for found in dyn.certify(model, 20, seed, speed=speed).residuals:
-            assert found.passed, found
-            assert "skew" not in found.equation or found.value < 0.5 * found.bound.value
+        assert failed(certify(model, 20, seed, speed=speed)) == {}
 
 
 @pytest.mark.parametrize(
@@ -281,13 +281,11 @@ OF_ONE = '<mujoco><worldbody><body><joint/><geom size="1"/></body></worldbody></
     [
         (TWO_LINKS, {"twin": OF_ONE}, "the twin has 1 degrees of freedom, the model 2"),
         (TWO_LINKS, {"twin": "/nowhere/arm.xml"}, "there is no file '/nowhere/arm.xml'"),
-        (TWO_LINKS, {"twin": "garbage"}, "there is no file 'garbage'"),
         (TWO_LINKS, {"twin": "<mujoco><garbage/></mujoco>"}, "MuJoCo cannot read the given text"),
         (TWO_LINKS, {"twin": 7}, "a model is a path or XML text, and of MJCF an MjModel, too, got int"),
         (dyn.scenes.load("spring_mass"), {"twin": OF_ONE}, "a twin is compared with rigid bodies"),
         (TWO_LINKS, {"seed": -1}, "seed must be a whole number from 0, got -1"),
         (TWO_LINKS, {"states": 0}, "states must be a whole number from 1, got"),
-        (TWO_LINKS, {"states": -1}, "states must be a whole number from 1, got"),
     ],
 )
 def test_what_cannot_be_certified_is_an_error(model: dyn.Model, given: dict[str, Any], said: str) -> None:
@@ -308,12 +306,12 @@ def urdf(parents: list[int]) -> str:
     return f'<robot name="r"><link name="world"/>{"".join(links)}</robot>'
 
 
-def test_a_urdf_file_is_a_twin(tmp_path) -> None:
-    """Meshes are not read, and MuJoCo goes down each branch before the next, whatever the order of the file is."""
+def test_a_urdf_file_is_a_twin_whatever_the_order_of_its_joints(tmp_path) -> None:
+    """MuJoCo goes down each branch before the next. Shapes are not read, so a mesh that is not there is no reason."""
     pytest.importorskip("mujoco")
-    text, file = urdf([-1, 0, 0, 1, 2, 1]), tmp_path / "arm.urdf"
-    mesh = '<visual><geometry><mesh filename="nowhere.stl"/></geometry></visual>'
-    file.write_text(text.replace("<inertial>", f"{mesh}<inertial>"))
+    file, text = tmp_path / "arm.urdf", urdf([-1, 0, 0, 1, 2, 1])
+    mesh = '<visual><geometry><mesh filename="nowhere.stl"/></geometry></visual><inertial>'
+    file.write_text(text.replace("<inertial>", mesh))
     mechanism = dyn.load_urdf(text)
     assert mechanism.coordinates == tuple([f"j{k}" for k in range(6)])
     found = certify(mechanism, FEW, twin=file)
@@ -332,14 +330,6 @@ def test_the_command_translates_what_mujoco_cannot_read(tmp_path, capsys: pytest
     assert printed.err.startswith("cgraph: compared is the model that was read, not the file: MuJoCo cannot read ")
 
 
-def test_pinocchio_agrees_when_it_is_there() -> None:
-    pytest.importorskip("pinocchio")
-    for model in (FAMILIES["branched"](5), dyn.planar_arm([1.0, 0.8], [1.0, 0.7], damping=0.1, gravity=3.0)):
-        found = certify(model, FEW)
-        assert failed(found) == {}
-        assert "inverse dynamics = Pinocchio's" in [each.equation for each in found.residuals]
-
-
 def test_a_body_that_pinocchio_does_not_take_is_named() -> None:
     """Moments below rounding, as programs write those of a point mass that they have moved about."""
     pytest.importorskip("pinocchio")
@@ -349,15 +339,7 @@ def test_a_body_that_pinocchio_does_not_take_is_named() -> None:
     assert "Pinocchio: does not take body 'a'" in str(certificate)
 
 
-def test_forces_on_bodies_are_not_asked_of_peers() -> None:
-    mechanism = FAMILIES["serial"](3)
-    pushed = replace(mechanism, forces=[dyn.Force("b2", (1.0, 2.0, "f"))], parameters={"f": 3.0})
-    assert failed(certify(pushed, FEW)) == {}
-
-
 def test_the_command_prints_a_certificate(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["certify", "spring_mass", "--states", "3"]) == 0
-    assert "dM/dt - 2 C is skew" in capsys.readouterr().out
     assert cli.main(["certify", "triple_pendulum", "--states", "3", "--seed", "4", "--json"]) == 0
     given = json.loads(capsys.readouterr().out)
     assert (given["scene"], given["passed"], given["states"], given["seed"]) == ("triple_pendulum", True, 3, 4)
