@@ -141,6 +141,7 @@ class Original:
     ) -> None:
         self.mj, self.orders, self.mechanism, self.ctrl = mj, orders, mechanism, ctrl
         self.q_order, self.order = map(list, orders)
+        mj.body_sameframe[:] = 0  # by itself MuJoCo takes frames that are less than 1e-6 apart for one
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
