@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import is_finite, kept_by_first, memo, require_choice
-from cgraph.extend import topological
+from cgraph.extend import Builder, topological
 
 from ..equations.constraints.constraint_rank import independent_rows
 from ..equations.constraints.projection import projection
@@ -165,8 +165,8 @@ def force(problem: Problem) -> Graph | None:
     system = problem.system
     if system is None:
         return None
-    parts = zip(system.tau, system.forces, system.damping, system.qd, strict=True)
-    outputs = {f"force{i}": tau + forces - damping * qd for i, (tau, forces, damping, qd) in enumerate(parts)}
+    parts = zip(system.tau, system.forces, system.braking(Builder()), strict=True)
+    outputs = {f"force{i}": tau + forces - brake for i, (tau, forces, brake) in enumerate(parts)}
     return problem.bind(problem.states, Graph(quantity_inputs(problem), outputs))
 
 

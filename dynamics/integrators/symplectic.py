@@ -74,9 +74,10 @@ def mechanics(problem: Problem) -> Mechanics:
     build, n, p = Builder(), system.n, new_variables("p", system.n, system.parameters)
     bars = cotangents({system.lagrangian: cg.constant(1.0)}, [*system.q, *system.qd], build)
     slopes, momenta = bars[:n], bars[n:]
+    braking = system.braking(build)
     with building(build):
-        parts = zip(slopes, system.tau, system.forces, system.damping, system.qd, strict=True)
-        force = [slope + tau + applied - damping * qd for slope, tau, applied, damping, qd in parts]
+        parts = zip(slopes, system.tau, system.forces, braking, strict=True)
+        force = [slope + tau + applied - brake for slope, tau, applied, brake in parts]
         missing = [wanted - here for wanted, here in zip(p, momenta, strict=True)]
     try:
         steps = solve_nodes(system.lagrangian, system.qd, missing, build)

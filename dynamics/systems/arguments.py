@@ -8,6 +8,8 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from types import CodeType, FunctionType
 from typing import Any, NoReturn
 
+import numpy as np
+
 import cgraph as cg
 from cgraph import Node
 from cgraph._shared import check_name, formulating, is_finite, is_function, or_nearest, real_number, require_mapping
@@ -69,14 +71,28 @@ def per_coordinate(
 
 
 def coefficients(
-    what: str, value: float | Node | Sequence[float | Node], names: Sequence[str]
+    what: str, value: float | Node | Sequence[float | Node], names: Sequence[str], minimum: float = 0.0
 ) -> tuple[float | Node, ...]:
-    """A number of at least 0, or a node, for each of the named coordinates. Raises ValueError."""
+    """A number that is not below the minimum, or a node, for each of the named coordinates. Raises ValueError."""
     entries = [value] * len(names) if isinstance(value, numbers.Real | Node) else sequence(f"{what} must be", value)
-    if any([hasattr(each, "__len__") for each in entries]):
-        raise ValueError(f"{what} takes a number for each velocity; a matrix D is forces=lambda q, qd, t, p: -D @ qd")
-    known = per_coordinate(what, [0.0 if isinstance(each, Node) else each for each in entries], names, minimum=0.0)
+    known = per_coordinate(what, [0.0 if isinstance(each, Node) else each for each in entries], names, minimum)
     return tuple([each if isinstance(each, Node) else number for each, number in zip(entries, known, strict=True)])
+
+
+def dampers(value: Any, names: Sequence[str]) -> tuple[Any, ...]:
+    """Damping: a coefficient for each of the names, or rows of a matrix that takes energy. Raises ValueError."""
+    rows: Sequence[Any] = [value] if isinstance(value, numbers.Real | Node) else sequence("damping must be", value)
+    if not any([hasattr(row, "__len__") for row in rows]):
+        return coefficients("damping", value, names)
+    if len(rows) != len(names):
+        raise ValueError(f"a matrix of damping needs a row for each of {', '.join(names)}, got {len(rows)}")
+    matrix = tuple([coefficients("a row of damping", row, names, -math.inf) for row in rows])
+    if not any([isinstance(each, Node) for row in matrix for each in row]):
+        whole = np.array(matrix, dtype=np.float64)
+        scale = np.sqrt(np.where(np.diag(whole) > 0.0, np.diag(whole), 1.0))  # of units
+        if np.linalg.eigvalsh((whole + whole.T) / np.outer(scale, scale))[0] < -len(names) * 2.0**-50:
+            raise ValueError(f"damping must take energy, qd D qd >= 0 at all qd, which {whole.tolist()} does not")
+    return matrix
 
 
 def parameters_of(parameters: Mapping[str, float] | None) -> dict[str, float]:

@@ -19,7 +19,7 @@ from .arguments import (
     TIME,
     Parameters,
     call_user_function,
-    coefficients,
+    dampers,
     node_or_number,
     one_for_each,
     parameters_of,
@@ -29,7 +29,7 @@ from .arguments import (
 from .body_terms import BodyTerms
 from .constraints import Constraints
 from .energies import Energies, added, energies, split_by_motion
-from .kinematics import Kinematics
+from .kinematics import Kinematics, dot
 from .quasi_velocities import QuasiVelocities
 
 
@@ -51,9 +51,9 @@ class System(HoldsNodes):
     forces : callable
         (q, qd, t) or (q, qd, t, p) to one generalized force for each coordinate, node or number [N m or N], beside the
         applied tau.
-    damping : float or node, or a sequence of them
-        Viscous coefficient >= 0 for all coordinates or for each [N m s or N s/m]; the force is -damping * qd. A node is
-        over parameters.
+    damping : float or node, a sequence of them, or a matrix
+        Viscous coefficient >= 0 for all coordinates or for each [N m s or N s/m], or (n, n) for dampers between them,
+        of numbers so that qd D qd >= 0; the force is -D qd. A node is over parameters.
     quasi_velocities : QuasiVelocities
         Where the velocities qd are no rates of the coordinates, how they move them. L is then L(q, qd, t) of these
         velocities, and forces, damping and tau belong to them, n of each; of the coordinates there are nq.
@@ -97,7 +97,7 @@ class System(HoldsNodes):
         coordinates: Sequence[str],
         parameters: Mapping[str, float] | None = None,
         forces: Callable[..., Sequence[Node | float]] | None = None,
-        damping: float | Node | Sequence[float | Node] = 0.0,
+        damping: float | Node | Sequence[float | Node | Sequence[float | Node]] = 0.0,
         quasi_velocities: QuasiVelocities | None = None,
         constraints: Callable[..., object] | None = None,
         velocity_constraints: Callable[..., object] | None = None,
@@ -111,7 +111,7 @@ class System(HoldsNodes):
         if body_terms is None:  # the types of joints are known to be consistent
             self.kinematics.require_consistent()
         self.parameters = parameters_of(parameters)
-        self.damping = coefficients("damping", damping, self.velocities)
+        self.damping = dampers(damping, self.velocities)
         p = Parameters(self.parameters)
         energy = call_user_function("lagrangian", lagrangian, self.q, self.qd, self.t, p)
         single = isinstance(energy, (Node, numbers.Real))
@@ -123,7 +123,7 @@ class System(HoldsNodes):
         if forces is not None:
             with cg.tag("force"):
                 self.forces = tuple(generalized_forces("forces", forces, self, p))
-        damped = [each for each in self.damping if isinstance(each, Node)]
+        damped = [each for row in self.damping_rows for each in row if isinstance(each, Node)]
         require_known("damping", damped, p.values(), f"no parameter (it has {', '.join(p) or 'none'})")
         self.constraints = Constraints(self.kinematics, self.t, self.parameters, constraints, velocity_constraints)
         self.require_known("the system", self._given, p)
@@ -268,10 +268,21 @@ class System(HoldsNodes):
             return extend.hessian_nodes(lagrangian, self.qd, build)
         return self.body_terms.equations.mass_matrix(self.q, self.qd, lagrangian, build or Builder())
 
-    def braking(self, build: Builder) -> list[Node]:
+    @property
+    def damping_rows(self) -> list[list[float | Node]]:
+        """The rows of D."""
+        if self.n and isinstance(self.damping[0], tuple):
+            return [list(row) for row in self.damping]
+        return [[each if i == k else 0.0 for k in range(self.n)] for i, each in enumerate(self.damping)]
+
+    def braking(self, build: Builder, velocities: Sequence[Node] | None = None) -> list[Node]:
         """The force that damping takes, D qd."""
+        qd = self.qd if velocities is None else velocities
         with building(build), cg.tag("damping"):
-            return [damping * qd for damping, qd in zip(self.damping, self.qd, strict=True)]
+            if not (self.n and isinstance(self.damping[0], tuple)):
+                return [damping * each for damping, each in zip(self.damping, qd, strict=True)]
+            rows = [[each if isinstance(each, Node) else cg.constant(each) for each in row] for row in self.damping]
+            return [dot(row, qd) for row in rows]
 
     def graph(self, outputs: Mapping[str, Node], *state: Sequence[Node]) -> Graph:
         """A graph over state variables, then t if needed, then the parameters."""

@@ -192,8 +192,8 @@ class _Checks:
     @cached_property
     def pushed(self) -> Array:
         """Applied forces less damping."""
-        rows = zip(self.system.forces, self.system.damping, self.system.qd, strict=True)
-        return self.value(self.graph({f"f{i}": f - damping * u for i, (f, damping, u) in enumerate(rows)}))
+        rows = zip(self.system.forces, self.system.braking(Builder()), strict=True)
+        return self.value(self.graph({f"f{i}": force - brake for i, (force, brake) in enumerate(rows)}))
 
     @cached_property
     def accelerations(self) -> Array:

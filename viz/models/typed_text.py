@@ -109,8 +109,13 @@ class _Writer:
 
     def text(self, q: Sequence[float], qd: Sequence[float]) -> str:
         """Text of all lines."""
-        system, damping = self.system, [node for node in self.system.damping if isinstance(node, Node)]
-        order = topological([system.lagrangian, *system.forces, *damping])
+        system, forces = self.system, list(self.system.forces)
+        own = [row[i] for i, row in enumerate(system.damping_rows)]
+        for i, row in enumerate(system.damping_rows):  # dampers between coordinates are forces
+            for k, each in enumerate(row):
+                if k != i and each != 0.0:
+                    forces[i] = forces[i] - each * system.qd[k]
+        order = topological([system.lagrangian, *forces, *[node for node in own if isinstance(node, Node)]])
         uses = Counter([arg for node in order for arg in node.args])
         for node in order:
             self.written[node] = self._formula(node)
@@ -120,7 +125,7 @@ class _Writer:
                 self.written[node] = name, _WHOLE
         lines = [f"q: {', '.join(self.coordinates)}", *self.parameters, *self.definitions]
         lines.append(f"L = {self.written[system.lagrangian][0]}")
-        for kind, values in (("damping", system.damping), ("tau", system.forces)):
+        for kind, values in (("damping", own), ("tau", forces)):
             for name, value in zip(self.coordinates, values, strict=True):
                 text = self.written[value][0] if isinstance(value, Node) else _number(value)
                 lines += [f"{kind} {name} = {text}"] if text not in ("0", "-0") else []

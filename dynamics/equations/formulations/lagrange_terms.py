@@ -143,12 +143,13 @@ def torques(system: System, formulation: str = "chain_rule", through: Node = ONE
     terms = _lagrange_terms(system, formulation, through)
     applied = _forces(system, terms)
     build = Builder()
+    braking = system.braking(build, terms.qd)
     outputs = {}
     with building(build):
         for i in range(system.n):
             tau = terms.momentum_rate[i] - terms.gradient[i]
             with cg.tag("damping"):
-                tau = tau + system.damping[i] * terms.qd[i]
+                tau = tau + braking[i]
             outputs[f"tau{i}"] = tau - applied[i]
     return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
 

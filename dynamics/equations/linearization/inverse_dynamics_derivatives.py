@@ -68,7 +68,7 @@ def torque_derivatives(
         forces = [force + pull for force, pull in zip(forces, pulls, strict=True)] if pulls else forces
         for i, (brake, force) in enumerate(zip(braking, forces, strict=True)):
             torque[i] = torque[i] + brake - force
-            by_qd[i][i] = by_qd[i][i] + system.damping[i]
+            by_qd[i] = [slope + damping for slope, damping in zip(by_qd[i], system.damping_rows[i], strict=True)]
     for i, slopes in enumerate(state_slopes(system, forces, build)):
         slopes = folded(slopes, build, at) if pulls else slopes
         with building(build):

@@ -64,8 +64,7 @@ def _parts(transform: Legendre, *, momenta: bool) -> LinearizationParts:
     with building(build):
         # R = P - F_u, where F_u has the damping D with its sign turned
         gain = [[a - b for a, b in zip(twist[i], forces[i][n:], strict=True)] for i in range(n)]
-        for i, damping in enumerate(system.damping):
-            gain[i][i] = gain[i][i] + damping
+        gain = [[a + b for a, b in zip(*rows, strict=True)] for rows in zip(gain, system.damping_rows, strict=True)]
     sides, second = _slopes(transform)
     solve = smaller_solution(system, lambda method: mass_solve(system, build, method), lambda each: each.size(2 * n))
     rest = {"S": second, "R": gain, "F": [row[:n] for row in forces], "C": kinematics.brackets(build)}

@@ -128,10 +128,11 @@ def _power(system: System, mu: Sequence[Node], qdd: Sequence[Node]) -> Node:
     terms, build = bias_terms(system, qdd), Builder()
     along = tangents(dict(zip(system.qd, mu, strict=True)), list(terms.inertial), build)
     power = zero = cg.constant(0.0)
+    braking = system.braking(build)
     with building(build):
         for velocity, force in terms.inertial.items():
             power = power - force * along.get(velocity, zero)
-        rows = zip(mu, terms.gradient, system.tau, terms.forces, system.damping, system.qd, strict=True)
-        for speed, slope, tau, applied, damping, qd in rows:
-            power = power + speed * (slope + tau + applied - damping * qd)
+        rows = zip(mu, terms.gradient, system.tau, terms.forces, braking, strict=True)
+        for speed, slope, tau, applied, brake in rows:
+            power = power + speed * (slope + tau + applied - brake)
     return power

@@ -1,5 +1,8 @@
 """The Coriolis matrix: closed form, Christoffel's symbols from differences of M, and what holds of every one."""
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 import pytest
 from pytest import approx
@@ -74,3 +77,25 @@ def test_damping_takes_its_coefficient_times_the_velocity() -> None:
     qd = np.array([1.0, -2.0, 3.0])
     assert evaluate(arm.system, graph, {"qd": qd, "q": qd}) == approx(np.array(arm.system.damping) * qd)
     assert {tag for node in graph.nodes for tag in node.tags} == {"damping"}
+
+
+def test_dampers_between_coordinates_are_the_force_of_their_matrix() -> None:
+    """By every equation with damping in it, and a linear motion as the exponential has it."""
+    c, rng = cg.variable("c"), np.random.default_rng(0)
+    rows = [[c + 0.3, -c], [0.2 - c, c]]
+
+    def blocks(**given: Any) -> dyn.System:
+        return dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2 - q[0] ** 2), "x y", {"c": 0.5}, **given)
+
+    damped, pushed = blocks(damping=rows), blocks(forces=lambda q, qd, t: -np.array(rows) @ qd)
+    equations = [dyn.forward_dynamics, dyn.hamilton_equations, dyn.state_space, dyn.inverse_dynamics_derivatives]
+    equations += [partial(dyn.inverse_dynamics, formulation=name) for name in dyn.FORMULATIONS]
+    for each in equations:
+        ours, theirs = each(damped), each(pushed)
+        point = dict(zip(ours.input_names, rng.normal(size=len(ours.inputs)), strict=True))
+        assert ours.evaluate(point) == approx(theirs.evaluate(point), rel=1e-12, abs=1e-15)
+    values, vectors = np.linalg.eig([[0, 0, 1, 0], [0, 0, 0, 1], [-1, 0, -0.8, 0.5], [0, 0, 0.3, -0.5]])
+    exact = vectors @ (np.exp(2.0 * values) * np.linalg.solve(vectors, [1.0, 0.0, 0.0, 0.5]))
+    for options in ({"method": "dop853"}, {"method": "verlet", "dt": 1e-3, "form": "velocity"}):
+        run = dyn.simulate(damped, [1.0, 0.0], [0.0, 0.5], 2.0, **options)
+        assert [*run.q[-1], *run.qd[-1]] == approx(exact.real, rel=1e-6)

@@ -50,7 +50,7 @@ _SYSTEMS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
     "parameter NaN": ({"parameters": {"k": math.nan}}, ValueError, "parameter 'k' must be a finite number, got nan"),
     "parameter text": ({"parameters": {"k": "3"}}, ValueError, "parameter 'k' must be a finite number, got '3'"),
     "damping negative": ({"damping": -1.0}, ValueError, "damping must be finite and at least 0, got -1.0"),
-    "damping a matrix": ({"damping": [[0.1]]}, ValueError, "matrix D is forces=lambda q, qd, t, p: -D @ qd"),
+    "damping that feeds": ({"damping": [[-0.1]]}, ValueError, "damping must take energy, qd D qd >= 0"),
     "dampings differ": ({"damping": [1.0, 2.0]}, ValueError, "damping needs one number for each of .*: 1, got 2"),
     "forces too many": (
         {"forces": lambda q, qd, t: [1.0, 2.0]},
