@@ -236,8 +236,9 @@ class _Checks:
         if self.moves and not self.timed:
             rate = self.matrix(self.rate(mass_matrix(self.system)))
             skew = rate - 2.0 * matrix
-            # What does not change at a state is a sum of products that cancel: only others show how large these are.
-            terms = np.broadcast_to((np.abs(rate) + np.abs(matrix)).max(axis=0), rate.shape)
+            # What does not change at a state is a sum of products that cancel: others, and M, show how large these are.
+            terms = np.abs(rate) + np.abs(matrix) + np.abs(self.inertia) * np.abs(qd).max()
+            terms = np.broadcast_to(terms.max(axis=0), rate.shape)
             yield rounded("coriolis: dM/dt - 2 C is skew", skew + np.swapaxes(skew, 1, 2), terms)
         yield self._sum("motion: torques by motion add up to tau", torque_by_joint_motion(self.system))
 
