@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph._shared import Array, check_name, is_finite
+from cgraph._shared import Array, check_name, is_finite, nearest, or_nearest
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS, TYPES, JointType
@@ -305,6 +305,20 @@ def _pitch(where: str, joint: Joint) -> float:
         needs = f"only a screw has a pitch, not {kind!r}" if pitch else f"a joint of the kind {kind!r} needs a pitch"
         raise MechanismError(f"{where}: {needs}, got {pitch!r} m/rad")
     return float(pitch)
+
+
+def body_name(bodies: Sequence[Body], given: str, what: str = "") -> str:
+    """Name of the body that is called so, or whose joint is. Raises MechanismError where there is none.
+
+    what: it is looked for, such as "to lock ".
+    """
+    if not isinstance(given, str):
+        raise MechanismError(f"a body is named by a string, got {type(given).__name__}: {given!r:.60}")
+    known = {body.coordinate: body.name for body in bodies} | {body.name: body.name for body in bodies}
+    if given not in known:
+        near = f": {or_nearest(given, list(known))}" if nearest(given, known) else ""
+        raise MechanismError(f"there is no body {given!r:.80} {what}in the mechanism{near}")
+    return known[given]
 
 
 def checked_name(what: str, name: str, *, spaces: bool = True) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph._shared import Array, is_finite, require_mapping
+from cgraph._shared import Array, is_finite, nearest, or_nearest, require_mapping
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS
@@ -20,6 +20,7 @@ from .body import (
     Body,
     Joint,
     MechanismError,
+    body_name,
     check_limits,
     checked_name,
     checked_rotation,
@@ -58,7 +59,8 @@ def require_parents(bodies: Sequence[Body]) -> None:
     known = {WORLD, *[body.name for body in bodies]}
     for body in bodies:
         if body.parent not in known:
-            raise MechanismError(f"body {body.name!r} has the unknown parent {body.parent!r}")
+            near = f": {or_nearest(body.parent, list(known))}" if nearest(body.parent, known) else ""
+            raise MechanismError(f"body {body.name!r} has the unknown parent {body.parent!r}{near}")
 
 
 @contextmanager
@@ -82,9 +84,8 @@ def locked_parts(bodies: Sequence[Body], locked: Mapping[str, float | ArrayLike]
     """
     by_name = {body.name: body for body in bodies}
     result: dict[str, float | ArrayLike] = {}
-    for name, value in require_mapping("locked", locked, "body: coordinate").items():
-        if name not in by_name:
-            raise MechanismError(f"there is no body {name!r:.80} to lock in the mechanism")
+    for given, value in require_mapping("locked", locked, "body: coordinate").items():
+        name = body_name(bodies, given, "to lock ")
         count = len(COMPOSITIONS.get(by_name[name].joint.kind, ()))
         if not count:
             result[name] = value
