@@ -44,7 +44,11 @@ if TYPE_CHECKING:
         format_polynomial as format_polynomial,
     )
     from .simplification.reading_form import reading_form as reading_form
-    from .simplification.rounding_growth import error_bounds as error_bounds, rounding_spread as rounding_spread
+    from .simplification.rounding_growth import (
+        error_bounds as error_bounds,
+        output_bounds as output_bounds,
+        rounding_spread as rounding_spread,
+    )
     from .util.atomic_write import (
         atomic_write as atomic_write,
         check_writable as check_writable,

@@ -14,7 +14,7 @@ from cgraph._shared import Array, is_finite
 from cgraph.extend import Builder, building
 
 from ..equations.constraints.nearly_redundant_rows import without_nearly_redundant
-from ..systems.constraints import Constraints, LoopRow
+from ..systems.constraints import ConstraintError, Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple
 from .bodies.body import WORLD, Body, MechanismError, checked_name, checked_rotation, unknown_body, vector
@@ -65,7 +65,7 @@ class Loop:
     tolerance : float
         A row that nearly follows from the others, as those across the plane of a linkage whose axes are parallel but
         for the rounding of a file, is left out with a warning, if no more of it is new than this, of the largest row
-        of the loop. 0 leaves out none.
+        of the loop, and if it opens by no more than this, of the loop's longest lever. 0 leaves out none.
 
     Raises
     ------
@@ -153,16 +153,22 @@ def position_rows(
     locked: Mapping[str, ArrayLike],
     states: Sequence[LinkState],
 ) -> dict[str, Node]:
-    """phi(q) of all loops.  locked: coordinates of joints that stand still.  states: of the links that move."""
+    """phi(q) of loops, but for those whose joints all stand still.  states: of the links that move.
+
+    locked: coordinates of joints that stand still. Raises ConstraintError where a loop stays open between such.
+    """
     coordinates = {name: cg.constant(float(np.ravel(at)[0])) for name, at in locked.items()}
     coordinates |= {at.name: at.q[0] for at in states}
     rows: dict[str, Node] = {}
     for loop in loops:
         if loop.kind == "coupling":
-            phi = [_coupling_row(loop, coordinates)]
+            phi, sizes = [_coupling_row(loop, coordinates)], [1.0]
         else:
-            ends = [carriers[name] for name in loop.bodies]
-            phi = _loop_rows(loop, *kinematic_chains(ends, moving, states))
+            chains = kinematic_chains([carriers[name] for name in loop.bodies], moving, states)
+            phi, sizes = _loop_rows(loop, *chains), [*chains[0].lengths(loop.at), *chains[1].lengths(loop.to_at)]
+        if all([row.value is not None for row in phi]):
+            _require_closed(loop, [float(row.value or 0.0) for row in phi], max(sizes))
+            continue
         rows |= dict(zip(loop.rows, phi, strict=True))
     return rows
 
@@ -182,12 +188,44 @@ def of_loops(constraints: Constraints, loops: Sequence[Loop], moving: Sequence[B
     return without_nearly_redundant(constraints)
 
 
+def coupled(loop: Loop, standing: Mapping[str, float | ArrayLike]) -> dict[str, float]:
+    """The coordinate that a coupling gives the last of its joints, where the others stand still; else empty."""
+    moving = [name for name in loop.bodies if name not in standing and name != WORLD]
+    if loop.kind != "coupling" or len(moving) != 1 or not any([name in standing for name in loop.bodies]):
+        return {}
+    (share, own), (to_share, other) = (
+        (
+            dict(_shares(end)).get(moving[0], 0.0),
+            sum([x * float(np.ravel(standing[name])[0]) for name, x in _shares(end) if name in standing]),
+        )
+        for end in (loop.body, loop.to)
+    )
+    polynomial = np.polynomial.Polynomial(np.asarray(loop.coefficients, dtype=np.float64))
+    if share:
+        return {moving[0]: (float(polynomial(other)) - own) / share}
+    roots = (polynomial - own).trim().roots()
+    real = roots[np.abs(roots.imag) <= CLOSURE_ROUNDING * np.abs(roots)].real
+    return {moving[0]: (float(min(real, key=abs)) - other) / to_share} if len(real) and to_share else {}
+
+
+def _require_closed(loop: Loop, gaps: Sequence[float], size: float) -> None:
+    """Raises ConstraintError for a loop among joints that stand still which is open by more than its tolerance."""
+    for name, gap in zip(loop.rows, gaps, strict=True):
+        scale = 1.0 if " about " in name.removeprefix(loop.label) else size
+        if abs(gap) > max(loop.tolerance, CLOSURE_ROUNDING) * scale:
+            raise ConstraintError(
+                f"the constraints cannot be met: {name!r} is open by {gap:.3g}, and its joints are locked"
+            )
+
+
 def velocity_rows(loops: Sequence[Loop], chain: Callable[[str], KinematicChain]) -> dict[str, Node]:
     """Velocities that are zero in loops that roll.  chain: the joints between a body and the world."""
     rows: dict[str, Node] = {}
     for loop in loops:
         if loop.velocity_rows:
-            rows |= dict(zip(loop.velocity_rows, _slip_rows(loop, *map(chain, loop.bodies)), strict=True))
+            slips = _slip_rows(loop, *map(chain, loop.bodies))
+            if any([slip.value is None for slip in slips]):
+                rows |= dict(zip(loop.velocity_rows, slips, strict=True))
     return rows
 
 

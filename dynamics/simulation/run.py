@@ -18,7 +18,7 @@ from cgraph import Graph
 from cgraph._shared import Array, HoldsNodes, floats, kept_by_first, real_number, require_kind
 
 from ..equations.state_equation import state_inputs
-from ..equations.states.initial_value import initial_values, other_inputs, start_state
+from ..equations.states.initial_value import initial_values, note_start, other_inputs, start_state
 from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
 from ..integrators.rate_in_modes import rows_in_modes, switched
 from ..systems.arguments import parameter_value
@@ -370,6 +370,7 @@ class Run(HoldsNodes):
 
     def _trajectory(self, q: ArrayLike, qd: ArrayLike | None, span: Span, parameters: Values) -> Trajectory:
         """The motion over the span, with parameters built in. Raises InterruptedMotion by Ctrl-C."""
+        note_start(self.applied.model, q, qd, span.t0)
         (applied, _, problem, stepped, _), p = self._equations, self._open_values(parameters)
         start, values = self._start(q, qd, span, p), p or 0.0
         if not self._options.adaptive and span.times is None:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from cgraph import Node
-from cgraph._shared import check_name, shortened
+from cgraph._shared import Array, check_name, shortened
 from cgraph.extend import Builder, cotangents, topological
 
 from .arguments import Parameters, call_user_function, node_or_number, sequence
@@ -51,6 +51,7 @@ class Constraints:
     names: of all rows, m: those of positions, then those of velocities alone.
     positions: phi.  velocities: A u + a, linear in the velocities.  parameters: values by name.
     loop_rows: of the rows that loops have, by name.  turning: whether each velocity is of an angle.
+    given: states that callers gave, (q, t, parameters), where rows are looked at if no other meets them.
     whole: the constraints with all rows, where some are 0 as they nearly follow from others; left_out: these, and gaps.
     """
 
@@ -83,6 +84,7 @@ class Constraints:
         if twice:
             raise ValueError(f"two constraints have the name {twice[0]!r}")
         self.positions, self.velocities = given.values()
+        self.given: list[tuple[Array, float, Mapping[str, float]]] = []
         self._check()
 
     def __len__(self) -> int:

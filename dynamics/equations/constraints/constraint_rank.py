@@ -12,11 +12,11 @@ from cgraph._shared import Array, kept_by_first
 from ...systems.constraints import ConstraintError, Constraints
 from .row_numbers import row_numbers
 
-STATES = 8  # states that meet the constraints and whose rank is clear, at which rows are compared, at most
+STATES = 16  # states that meet the constraints and whose rank is clear, at which rows are compared, at most
+SEEN = 5  # of these, about which rows that follow are looked at
 DEPENDENT = 1e-9  # of the largest row of a loop, or of a row of no loop: one of the others if no more of it is left
 BETTER = 5.0  # times as much of it has to be new for a row to be kept in place of one before it
 CLEAR = 1e-5  # what is left of rows that are independent: less is also seen where a state is singular but for rounding
-SLOPED = 1e-3  # of the slopes about a state: a row whose slopes are less wherever it is met has none there
 
 
 class ConstraintWarning(UserWarning):
@@ -50,34 +50,36 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     if not len(constraints):
         return ()
     numbers = row_numbers(constraints)
-    clear: dict[int, list[Array]] = {}  # by rank
+    clear: dict[int, list[tuple[dict[str, float], Array]]] = {}  # by rank
     doubtful: list[dict[int, float]] = []
-    acting, sizes = np.zeros(len(constraints), dtype=bool), np.zeros(len(constraints))
+    acting, flat = np.zeros(len(constraints), dtype=bool), np.ones(len(constraints), dtype=bool)
     for point in numbers.states():
         matrix = numbers.certain_matrix(point)
         acting |= matrix.any(axis=1)
-        rows, columns = numbers.scales(point)
-        matrix = rows[:, None] * matrix * columns
-        size = np.linalg.norm(matrix, axis=1)  # or less than the rounding of the state makes of it
-        sizes = np.maximum(sizes, np.where(rows * numbers.gap_rounding(point) < SLOPED * size, size, 0.0))
+        flat &= numbers.flat(point, matrix)
+        matrix = numbers.scaled(point, matrix)
         shares = _independent([matrix])
-        if min(shares.values(), default=1.0) < CLEAR:
+        if min(shares.values(), default=1.0) < max(CLEAR, 10.0 * np.sqrt(numbers.openings([point]).max(initial=0.0))):
             doubtful.append(shares)
             continue
-        clear.setdefault(len(shares), []).append(matrix)
+        clear.setdefault(len(shares), []).append((point, matrix))
         most = np.count_nonzero(numbers.typical(point, numbers.reach).any(axis=1))
         if sum(map(len, clear.values())) == STATES or len(shares) == most:
             break
-    for name, size in zip(constraints.names, sizes, strict=True):
-        if size < SLOPED and name not in constraints.loop_rows and constraints.whole is None:
+    for k in np.flatnonzero(flat):
+        if constraints.names[k] not in constraints.loop_rows and constraints.whole is None:
             text = "wherever it is met its slopes are 0, too, as those of a square are: write the condition itself"
-            raise ConstraintError(f"constraint {name!r} cannot hold the motion: {text}")
-    kept = max(doubtful, key=len, default={})
+            raise ConstraintError(f"constraint {constraints.names[k]!r} cannot hold the motion: {text}")
+    kept = doubted = max(doubtful, key=len, default={})
     if clear:
-        rank = max(clear)
-        kept = _independent(clear[rank], BETTER)
-        if len(kept) < rank:  # other rows at other states
-            kept = _independent(clear[rank][:1])
+        points, matrices = zip(*clear[max(clear)], strict=True)
+        kept = _independent(matrices, BETTER)
+        if len(kept) < max(clear):  # other rows at other states
+            kept = _independent(matrices[:1])
+        others = doubted if len(doubted) > len(kept) else np.flatnonzero(acting).tolist()
+        about = numbers.about(points[:SEEN], [*kept]) if len(kept) < len(constraints) else points[:1]
+        opened = numbers.openings(about).min(axis=0)  # at some states they may close another way
+        kept = dict.fromkeys(sorted({*kept, *[k for k in others if opened[k] > CLEAR]}), 1.0)
     small = [f"{constraints.names[k]!r} ({x:.1e} of it is new)" for k, x in kept.items() if x < CLEAR]
     if small and not clear:
         text = f"at all states seen next to nothing is new of {' and '.join(small)}: kept, and may hold the motion"

@@ -6,21 +6,20 @@ loop it is seen to be no more than the rounding of numbers in a file.
 """
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
 from cgraph._shared import Array
 
-from ...systems.constraints import ConstraintError, Constraints
+from ...systems.constraints import Constraints
 from .constraint_rank import DEPENDENT, independent_rows, warn_that_they_follow
-from .row_numbers import RowNumbers, equilibrated, factors, row_numbers
+from .row_numbers import RowNumbers, row_numbers
 
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
 STATES = 6
-SPREADS = (1.0, 0.3, 3.0, 0.1, 2.0, 0.5, 1.5, 0.03)  # of random starts about the neutral coordinates
-FAR_GAP = 1e3  # of the gap that a row was left out with
+STARTS = 12  # of these
 OPEN, WORSE = 1e-1, 30.0  # of a loop, at most, once it has arrived; and of the state that closes best
 EXACT = 1e-12  # of a row that is a sum of others but for the rounding of axes and lengths
 ALIKE = 0.5  # of the largest row: one that is as good
@@ -40,10 +39,13 @@ def left_without(constraints: Constraints, matrices: Sequence[Array], tolerance:
     Of rows that are about as large the first. tolerance: in place of those of the loops.
     """
     names, looped = constraints.names, constraints.loop_rows
-    scales = [factors(constraints, matrix) for matrix in matrices]
+    numbers = row_numbers(constraints)
+    scales = [numbers.factors(matrix) for matrix in matrices]
     rest = np.stack(
         [rows[:, None] * matrix * columns for (rows, columns), matrix in zip(scales, matrices, strict=True)]
     )
+    for members in numbers.groups:
+        rest[:, members] /= np.linalg.norm(rest[:, members], axis=2).max() or 1.0
     of_loops = [looped[name].tolerance if name in looped else 0.0 for name in names]
     least = np.maximum(of_loops if tolerance is None else [tolerance] * len(names), DEPENDENT)
     kept: list[int] = []
@@ -98,34 +100,61 @@ def least_new(constraints: Constraints, q: Array, t: float, parameters: Mapping[
 
 
 def opened(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float]) -> str:
-    """Sentence on rows that were left out and are far more open than where they were; "" where none is."""
+    """Sentence on rows that were left out and are open by more than the tolerance of their loop; "" where none is."""
     if constraints.whole is None:
         return ""
-    numbers = row_numbers(constraints.whole)
-    gaps, names = np.abs(numbers.gaps(numbers.point(q, {"t": t, **parameters}))), constraints.names
-    most = FAR_GAP * max(constraints.left_out.values())
-    open_rows = [k for k in constraints.left_out if k < len(gaps) and gaps[k] > most]
-    rows = [f"{names[k]!r} by {gaps[k]:.1e}" for k in open_rows]
+    whole, numbers = constraints.whole, row_numbers(constraints.whole)
+    point = numbers.point(q, {"t": t, **parameters})
+    gaps, (shares,) = np.abs(numbers.gaps(point)), numbers.openings([point])
+    rows = [
+        f"{whole.names[k]!r} by {gaps[k]:.1e}{_unit(whole, k)}"
+        for k in constraints.left_out
+        if shares[k] > whole.loop_rows[whole.names[k]].tolerance
+    ]
     return (
         f"constraints that nearly follow from the others and were left out are open: {', '.join(rows)}" if rows else ""
     )
 
 
 def without_nearly_redundant(constraints: Constraints) -> Constraints:
-    """The constraints with 0 for the rows of loops that nearly follow from others, with a warning that names them."""
+    """The constraints with 0 for the rows of loops that nearly follow from others, with a warning that names them.
+
+    A row of which little is new, but which opens by more than the tolerance where the others are closed, is kept.
+    """
     if not constraints.loop_rows:
         return constraints
     numbers = row_numbers(constraints)
-    found = _nearly_closed(constraints, numbers)
+    found = _nearly_closed(numbers)
     if not found:
         return constraints
     matrices = [numbers.certain_matrix(point) for point in found]
     kept, shares, sizes = left_without(constraints, matrices)
-    names, exact = constraints.names, _following(matrices, kept)
-    exact -= {k for k in exact if 0.0 < sizes[k] < NAMED}  # which others that are as small must not take in their place
-    dropped = [k for k in range(len(constraints)) if k not in kept and k not in exact]
-    close = [k for k in kept if names[k] in constraints.loop_rows and shares[k] < NAMED]
-    gaps = _gaps(constraints, numbers, found, {*kept} - {*close}) if dropped or close else np.zeros(0)
+    names, looped = constraints.names, constraints.loop_rows
+    tolerances = np.array([looped[name].tolerance if name in looped else np.inf for name in names])
+    shares_open = numbers.openings(found)
+    while len(kept) < len(names):
+        shares_open = numbers.openings([*found, *numbers.about(found, kept)])
+        over = np.median(shares_open[len(found) :], axis=0) - tolerances  # at some states they may close another way
+        over[kept] = 0.0
+        if not (over > 0.0).any():
+            break
+        kept = sorted([*kept, int(over.argmax())])
+    gaps = shares_open[: len(found)].max(axis=0)  # rows that follow to rounding count, but for those that are as small
+    exact = (shares <= EXACT) & (gaps <= DEPENDENT) & ((sizes == 0.0) | (sizes >= NAMED))
+    dropped = [k for k in range(len(names)) if k not in kept and not exact[k]]
+    close = [k for k in kept if names[k] in looped and shares[k] < NAMED]
+    if close:  # but for those of which more is new where no row is closed: the states that were found are singular
+        rng = np.random.default_rng(0)
+        apart = [numbers.displaced(point, numbers.reach, rng) for point in found]
+        there = left_without(constraints, [numbers.matrix(point) for point in apart]).shares
+        close = [k for k in close if there[k] < 3.0 * NAMED]
+    if dropped or close:
+        others = numbers.closings(held=sorted({*kept} - {*close}))
+        afar = numbers.openings([each.point for each in others if each.worst is None])
+        shares_open = np.concatenate([shares_open, afar])
+    within = np.where(shares_open > tolerances, 0.0, shares_open)
+    within[:, close] = shares_open[:, close]
+    gaps = within.max(axis=0) / (1.0 if numbers.scale is None else numbers.scale[0])
     for rows, what in (
         (dropped, "left out; a smaller tolerance of the Loop keeps {}"),
         (close, "kept: {} may hold the motion"),
@@ -138,43 +167,21 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
     return constraints.without({k: float(gaps[k]) for k in dropped}) if dropped else constraints
 
 
-def _gaps(constraints: Constraints, numbers: RowNumbers, found: list[dict[str, float]], closed: set[int]) -> Array:
-    """Largest gap of each row, (m,), at random states where these are closed."""
-    points, others = list(found), [k for k in range(len(constraints)) if k not in closed]
-    with suppress(ConstraintError):
-        points += RowNumbers(constraints.without(dict.fromkeys(others, 0.0))).states()
-    gaps = np.max([np.abs(numbers.gaps(point)) for point in points], axis=0)
-    return np.concatenate([gaps, np.zeros(len(constraints) - len(gaps))])
+def _nearly_closed(numbers: RowNumbers) -> list[dict[str, float]]:
+    """States where all rows are 0 but for what nearly follows from others, those that close best, of the highest rank.
 
-
-def _nearly_closed(constraints: Constraints, numbers: RowNumbers) -> list[dict[str, float]]:
-    """Random states where all rows are 0 but for what nearly follows from others, those that close best.
-
-    Near a place where a linkage is singular Newton's method may end with a gap that is not of its axes.
+    Near a place where a linkage is singular, least squares may end with a gap that is not of its axes.
     """
-    rng, found = np.random.default_rng(0), list[tuple[float, dict[str, float]]]()
-    neutral = np.array(constraints.kinematics.neutral)
-    for spread in SPREADS:
-        q = neutral + spread * rng.uniform(-1.0, 1.0, numbers.nq)
-        point = numbers.point(q, {"t": float(rng.uniform(0.3, 1.2)), **constraints.parameters})
-        gap, point = numbers.nearly_closed(point)
-        if gap < OPEN:
-            found.append((gap, point))
-    found.sort(key=lambda pair: pair[0])
-    return [point for gap, point in found[:STATES] if gap <= WORSE * found[0][0] + DEPENDENT]
+    closings = [each for each in islice(numbers.closings(nearly=True), STARTS) if each.size < OPEN]
+    closest = min([each.size for each in closings], default=0.0)
+    tolerance = max(row.tolerance for row in numbers.constraints.loop_rows.values())
+    closings = [each for each in closings if each.size <= max(WORSE * closest, tolerance, DEPENDENT)]
+    ranks = [np.linalg.matrix_rank(numbers.scaled(each.point), tol=NAMED) for each in closings]
+    best = [each for each, rank in zip(closings, ranks, strict=True) if rank == max(ranks)]
+    best.sort(key=lambda each: each.size)
+    return [each.point for each in best[:STATES] if each.size <= WORSE * best[0].size + DEPENDENT]
 
 
 def _unit(constraints: Constraints, k: int) -> str:
     row = constraints.loop_rows.get(constraints.names[k])
     return "" if row is None else " rad" if row.angle else " m"
-
-
-def _following(matrices: Sequence[Array], kept: Sequence[int]) -> set[int]:
-    """The rows that are sums of those kept to rounding, each beside its own size: rows of 0 among them."""
-    following = set(range(len(matrices[0]))) - {*kept}
-    for matrix in matrices:
-        alike = equilibrated(matrix)
-        basis = np.linalg.qr(alike[list(kept)].T)[0] if kept else np.zeros((alike.shape[1], 0))
-        rest = np.linalg.norm(alike - (alike @ basis) @ basis.T, axis=1)
-        following &= set(np.flatnonzero(rest <= EXACT * np.linalg.norm(alike, axis=1)).tolist())
-    return following

@@ -23,10 +23,12 @@ from ..substitute import substitute
 from .constraint_rank import ConstraintWarning, independent_rows
 from .constraints import Rows
 from .nearly_redundant_rows import lost_rank, opened
-from .row_numbers import FOLLOWS, RowNumbers, step_names
+from .row_numbers import row_numbers, step_names
 
 ITERATIONS = 20  # of Newton's method
 SPARE = 1.5  # certain digits of a row that is not 0: a start that is off by 30 roundings is moved and said to be
+NO_RATE = 1e-16  # of the rates that all velocities make
+FOLLOWS = 5.5  # of one that follows from others: the rounding of axes and lengths that it has in common
 
 
 @kept_by_first
@@ -72,6 +74,9 @@ def _correction(
 
 def projected(system: System, x: Array, t: float, parameters: Mapping[str, float]) -> Array:
     """The state x, (m,), if it meets the constraints to rounding, else one near to it that does."""
+    if not len(system.constraints):
+        return x
+    system.constraints.given[:] = [(x[: system.nq], t, dict(parameters))]
     graph = projection(system)
     if graph is None or not (left := _open_rows(system, x, x, t, parameters)):
         return x
@@ -80,7 +85,7 @@ def projected(system: System, x: Array, t: float, parameters: Mapping[str, float
     start, names = x, graph.input_names[: len(x)]
     for k in range(2 * ITERATIONS):
         if k == ITERATIONS:  # Newton's method may need shorter steps on its way from afar
-            point = RowNumbers(system.constraints).closed(start[: system.nq], t, parameters).point
+            point = row_numbers(system.constraints).closed(start[: system.nq], t, parameters).point
             x = np.array([*[point[f"q{i}"] for i in range(system.nq)], *start[system.nq :]])
         before = x
         with np.errstate(all="ignore"):
@@ -132,7 +137,8 @@ def _all_rows(system: System) -> Graph:
 def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Mapping[str, float]) -> list[int]:
     """Constraints that are not 0 at a state, or whose rate is not, beyond rounding.
 
-    That of the step from `before`, too: what is to be 0 is so once it is small beside what it was.
+    That of the step from `before`, too: what is to be 0 is so once it is small beside what it was. And a rate is 0 once
+    it is small beside the rates that all velocities together make.
     """
     graph = _all_rows(system)
     others = {"t": t, **parameters}
@@ -141,9 +147,13 @@ def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Ma
     point |= dict(zip([*names[:n], *names[-n:]], [*before.tolist(), *(x - before).tolist()], strict=True))
     values, digits = graph.evaluate(point), extend.certain_digits(graph, point)
     kept, left = independent_rows(system.constraints), set[int]()
+    numbers = row_numbers(system.constraints)
+    rows, columns = numbers.scales(numbers.point(x[: system.nq], {"t": t, **parameters}))
+    fastest = float(np.abs(x[system.nq :] / columns).max(initial=0.0))
     for name, value in values.items():
         k = int(name.removeprefix("phi").removeprefix("rate"))
-        most = SPARE if k in kept else SPARE + FOLLOWS
-        if value != 0.0 and not (digits[name] < most and np.isfinite(value)):
+        most = SPARE if k in kept else FOLLOWS
+        small = name.startswith("rate") and abs(rows[k] * value) <= NO_RATE * fastest
+        if value != 0.0 and not small and not (digits[name] < most and np.isfinite(value)):
             left.add(k)
     return sorted(left)

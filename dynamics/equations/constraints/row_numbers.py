@@ -19,14 +19,16 @@ from ...systems.kinematics import ONE
 from ..substitute import substitute
 
 SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 3  # of random starts about the neutral coordinates
-ITERATIONS, HALVINGS = 50, 12  # of Newton's method for such a state
-TRUNCATED = 4e-3  # of the largest singular value: what it does not close in `nearly_closed`
-LAST_STEP, LONGEST_STEP = 1e-9, 0.5  # steps there, of displacements
-SMALL_GAP = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
-OPEN = 0.5  # certain digits of a row that is not 0
-FOLLOWS = 4.0  # more digits of one that follows from others: the rounding of axes and lengths that it has in common
+ITERATIONS = 100  # of least squares for such a state
+TRUNCATED, ROUNDED = 4e-3, 1e-11  # of the largest singular value: at first, steps are not led to where the rank is less
+LAST_STEP = 1e-14  # of displacements
+DAMPING, LARGEST = 1e-1, 1e6  # of the first step, and where no step makes a gap smaller, beside singular values about 1
+AWAY = 0.2  # displacement of states that others are looked at about
+SMALL_GAP = 1e-3  # beside displacements: one that is said, as it may be that of the digits of a file
+OPEN = 4.5  # certain digits of a row that is not 0, and may follow from others, with their rounding
 UNCERTAIN = 0.1  # of an entry: no digit of it is certain where its rounding is larger
 ROUNDS = 4  # of scaling
+OPENED, FLAT = 1e6, 100.0  # times the rounding of a row; times what slopes say of a displacement
 NEAR_STATES = 3  # states about another one, at which rows are as large as they usually are
 SIZES = 10.0 ** np.arange(-10.0, 11.0)  # of displacements
 BENT, TURNED = 1e-3, 0.3  # of a row of J, by which it changes if it is not constant; of that, by which it has changed
@@ -61,84 +63,85 @@ class RowNumbers:
             self.landed = Graph([*self.inputs, *displaced.values()], outputs)
 
     def states(self) -> Iterator[dict[str, float]]:
-        """Random states that meet the constraints: values of q0.., t and parameters.
+        """States that meet the constraints: values of q0.., t and parameters.  See `closings`."""
+        open_ones: list[Closing] = []
+        for closing in self.closings():
+            if closing.worst is None:
+                yield closing.point
+            else:
+                open_ones.append(closing)
+        nearest = min(open_ones, key=lambda each: each.size, default=None)
+        if nearest is not None and len(open_ones) == len(SPREADS) + 1 + len(self.constraints.given):
+            gap = abs(self.gaps(nearest.point)[nearest.worst])
+            said = f"; it is {gap:.1e} at the nearest" if nearest.size < SMALL_GAP else ""
+            name = self.constraints.names[nearest.worst or 0]
+            raise ConstraintError(f"the constraints cannot be met: no state was seen where {name!r} is 0{said}")
 
-        Newton's method is drawn to where the rank is less; half of the states are nearly closed first, and start
-        about the state before, once there is one.
+    def closings(self, *, held: Sequence[int] | None = None, nearly: bool = False) -> Iterator[Closing]:
+        """Results of least squares from the neutral state, from random ones and some about those that are closed.
+
+        Where none is, from states that callers gave: what is found does not depend on these.
+        held, nearly: of `closed`.
         """
         rng = np.random.default_rng(0)
-        found: dict[str, float] = {}
-        nearest: tuple[float, int] | None = None
-        neutral = np.array(self.constraints.kinematics.neutral)
+        own, neutral = self.constraints.parameters, np.array(self.constraints.kinematics.neutral)
+        yield (best := self.closed(neutral, 0.0, own, held=held, nearly=nearly))
         for k, spread in enumerate(SPREADS):
             q, t = neutral + spread * rng.uniform(-1.0, 1.0, self.nq), float(rng.uniform(0.3, 1.2))
             if (k + k // 8) % 2:  # each spread once in two rounds
-                start = self.point(q, {"t": t, **self.constraints.parameters})
-                point = self.nearly_closed(self.displaced(found, self.reach, rng) if found else start)[1]
-                near = np.array([point[f"q{i}"] for i in range(self.nq)])
-                q = near if np.isfinite(near).all() else q
-            closing = self.closed(q, t)
-            if closing.worst is None:
-                yield closing.point
-                found = closing.point
-            elif nearest is None or closing.size < nearest[0]:
-                nearest = closing.size, closing.worst
-        if not found:
-            row = 0 if nearest is None else nearest[1]
-            raise ConstraintError(
-                f"the constraints cannot be met: no state was seen where {self.constraints.names[row]!r} is 0"
-            )
+                q = self.moved_by(best.point, self.reach * rng.uniform(-1.0, 1.0, self.n))
+            closing = self.closed(q, t, own, held=held, nearly=nearly)
+            yield closing
+            best = closing if closing.worst is None or closing.size < best.size else best
+        if best.worst is not None:
+            yield from [self.closed(*start, held=held, nearly=nearly) for start in self.constraints.given]
 
-    def nearly_closed(self, point: dict[str, float]) -> tuple[float, dict[str, float]]:
-        """Newton's method without small singular values: what it leaves of a loop, and where; inf if it never ends."""
-        with np.errstate(all="ignore"):
-            rows, columns = self.scales(point)
-            for _ in range(ITERATIONS):
-                phi, matrix = self.gaps(point), self.matrix(point)
-                left, scaled = rows[: len(phi)] * phi, (rows[:, None] * matrix * columns)[: len(phi)]
-                if not (np.isfinite(left).all() and np.isfinite(scaled).all()):
-                    break
-                step = -np.linalg.lstsq(scaled, left, rcond=TRUNCATED)[0]
-                size = float(np.linalg.norm(step))
-                shorter = min(1.0, LONGEST_STEP / size) if size else 1.0
-                point = self.point(self.moved_by(point, shorter * columns * step), point)
-                if size < LAST_STEP:
-                    return float(np.abs(rows[: len(phi)] * self.gaps(point)).max(initial=0.0)), point
-        return np.inf, point
+    def closed(
+        self,
+        q: Array,
+        t: float,
+        parameters: Mapping[str, float] | None = None,
+        *,
+        held: Sequence[int] | None = None,
+        nearly: bool = False,
+    ) -> Closing:
+        """A state that meets phi = 0, by least squares from q: damped steps of Gauss and Newton.
 
-    def closed(self, q: Array, t: float, parameters: Mapping[str, float] | None = None) -> Closing:
-        """A state that meets phi = 0, by Newton's method with halved steps from q.
-
-        parameters: in place of the constraints' own.
+        At first without small singular values, which lead to where the rank is less.
+        parameters: in place of the constraints' own.  held: rows to close, by default all.  nearly: without the steps
+        by all singular values, so that rows that nearly follow from others may stay open.
         """
         shown = {"t": t} | dict(self.constraints.parameters if parameters is None else parameters)
+        point = before = self.point(q, shown)
+        count, step = len(self.constraints.positions), np.zeros(self.n)
+        rows = np.array([k for k in (range(count) if held is None else held) if k < count], dtype=np.intp)
         with np.errstate(all="ignore"):
-            point = before = self.point(q, shown)
-            step = np.zeros(self.n)  # from the point before
-            size, looked = np.inf, 0.0  # at the rounding of phi, which takes longer than a step, once a gap is so small
-            for k in range(ITERATIONS):
-                phi = self.gaps(point)
-                if (not k or size <= looked) and not len(self._open_rows(before, step)):
-                    return Closing(point, 0.0, None)
-                matrix = self.matrix(point)[: len(phi)]
-                if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
-                    return Closing(point, np.inf, int(np.argmin(np.isfinite(phi))))
-                rows, columns = factors(self.constraints, matrix)
-                whole = -columns * np.linalg.lstsq(rows[:, None] * matrix * columns, rows * phi, rcond=1e-10)[0]
-                size = float(np.abs(rows * phi).max())
-                looked = looked or SMALL_GAP * size
-                for halved in range(HALVINGS):
-                    shorter = whole * 0.5**halved
-                    trial = self.point(self.moved_by(point, shorter), shown)
-                    if np.abs(rows * self.gaps(trial)).max() < size:
-                        before, point, step = point, trial, shorter
+            of_rows, columns = self.scale or factors(self.certain_matrix(point))
+            of_rows = of_rows[rows]
+            for least in (TRUNCATED,) if nearly else (TRUNCATED, ROUNDED):
+                damping = DAMPING
+                for _ in range(ITERATIONS):
+                    left, scaled = (
+                        of_rows * self.gaps(point)[rows],
+                        of_rows[:, None] * self.matrix(point)[rows] * columns,
+                    )
+                    if not (np.isfinite(left).all() and np.isfinite(scaled).all()):
+                        return Closing(point, np.inf, int(rows[np.argmin(np.isfinite(left))]))
+                    u, s, v = np.linalg.svd(scaled, full_matrices=False)
+                    u, s, v = (x[..., s > least * s.max(initial=0.0)] for x in (u, s, v.T))
+                    while damping < LARGEST:
+                        way = -v @ (s / (s * s + damping * damping) * (u.T @ left))
+                        trial = self.point(self.moved_by(point, columns * way), shown)
+                        if np.linalg.norm(of_rows * self.gaps(trial)[rows]) < np.linalg.norm(left):
+                            before, point, step = point, trial, columns * way
+                            damping *= 0.1
+                            break
+                        damping *= 10.0
+                    if damping >= LARGEST or np.abs(way).max() < LAST_STEP:
                         break
-                else:
-                    break
-            phi, open_rows = self.gaps(point), self._open_rows(before, step, OPEN + FOLLOWS)
-        if not len(open_rows):
-            return Closing(point, 0.0, None)
-        return Closing(point, size, int(open_rows[np.abs(phi[open_rows]).argmax()]))
+            gaps = np.abs(of_rows * self.gaps(point)[rows])
+        worst = int(rows[gaps.argmax()]) if np.isin(self._open_rows(before, step), rows).any() else None
+        return Closing(point, float(gaps.max(initial=0.0)), worst)
 
     def matrix(self, point: Mapping[str, float]) -> Array:
         """J, (m, n)."""
@@ -161,17 +164,59 @@ class RowNumbers:
             return np.where(rounding <= UNCERTAIN * np.abs(matrix), matrix, 0.0)
 
     @cached_property
+    def scale(self) -> tuple[Array, Array] | None:
+        """Factors of rows, one for each loop, and of columns, the same at all states; None where units are not known.
+
+        Angles stand as they are. Lengths are divided by the longest lever that a joint has in their loop, at the
+        neutral coordinates and where joints are turned. So no column that is rounding counts as much as another.
+        """
+        turning, looped = np.array(self.constraints.turning, dtype=bool), self.constraints.loop_rows
+        if not len(turning):
+            return None
+        rng, neutral = np.random.default_rng(1), np.array(self.constraints.kinematics.neutral)
+        start = self.point(neutral, {"t": 0.0, **self.constraints.parameters})
+        turned = [self.displaced(start, 1.0 * turning, rng) for _ in range(NEAR_STATES)]
+        typical = np.max([np.abs(self.certain_matrix(each)) for each in (start, *turned)], axis=0)
+        rows, columns = np.ones(len(typical)), np.zeros(self.n)
+        for members in self.groups:
+            lengths = [k for k in members if (row := looped.get(self.constraints.names[k])) and not row.angle]
+            lever = typical[lengths][:, turning].max(initial=0.0) or 1.0
+            rows[lengths] = 1.0 / lever
+            slides = ~turning & typical[members].any(axis=0)
+            columns[slides] = np.maximum(columns[slides], lever if lengths else 1.0)
+        columns[turning | (columns == 0.0)] = 1.0
+        coupled = [k for k, name in enumerate(self.constraints.names) if name not in looped]
+        rows[coupled] = 1.0 / np.maximum((typical * columns)[coupled].max(axis=1, initial=0.0), np.finfo(float).tiny)
+        return rows, columns
+
+    @cached_property
+    def groups(self) -> list[list[int]]:
+        """Rows of each loop, and others each alone."""
+        groups: dict[str, list[int]] = {}
+        for k, name in enumerate(self.constraints.names):
+            row = self.constraints.loop_rows.get(name)
+            groups.setdefault(f"row {name}" if row is None else f"loop {row.loop}", []).append(k)
+        return list(groups.values())
+
+    def factors(self, matrix: Array) -> tuple[Array, Array]:
+        """Factors of rows and columns that make J free of units: those of `scale`, or by its own entries."""
+        return self.scale or factors(matrix)
+
+    @cached_property
     def reach(self) -> Array:
         """The displacement along each velocity, in its unit, that turns the rows: J changes by as much as it is."""
+        if self.scale is not None:
+            return self.scale[1]
         rng, neutral = np.random.default_rng(0), np.array(self.constraints.kinematics.neutral)
         for spread in SPREADS[:NEAR_STATES]:
-            closing = self.closed(neutral + spread * rng.uniform(-1.0, 1.0, self.nq), float(rng.uniform(0.3, 1.2)))
+            q, t = neutral + spread * rng.uniform(-1.0, 1.0, self.nq), float(rng.uniform(0.3, 1.2))
+            closing = self.closed(q, t)
             if closing.worst is None:
                 break
         point, here = closing.point, self.matrix(closing.point)
         typical = np.abs(here)
         for _ in range(2):  # an entry that is 0 there, but for rounding, has no size before
-            columns = factors(self.constraints, typical)[1]
+            columns = factors(typical)[1]
             with np.errstate(all="ignore"):
                 step = columns * rng.uniform(-1.0, 1.0, self.n)
                 there = [self.matrix(self.point(self.moved_by(point, size * step), point)) for size in SIZES]
@@ -195,34 +240,73 @@ class RowNumbers:
         with np.errstate(all="ignore"):
             return self.point(self.moved_by(point, reach * rng.uniform(-1.0, 1.0, self.n)), point)
 
+    def about(self, found: Sequence[dict[str, float]], held: Sequence[int]) -> list[dict[str, float]]:
+        """States about others where the rows that are held are closed; these themselves where there are none."""
+        rng, points = np.random.default_rng(0), list[dict[str, float]]()
+        for point in found:
+            closing = self.closed(self.freely_displaced(point, rng, held), point["t"], point, held=held)
+            points.append(closing.point if closing.worst is None else point)
+        return points
+
+    def freely_displaced(self, point: dict[str, float], rng: np.random.Generator, held: Sequence[int]) -> Array:
+        """q of a state displaced at random along what the rows that are held leave free."""
+        _, s, v = np.linalg.svd(self.scaled(point)[list(held)], full_matrices=False)
+        way, v = rng.uniform(-AWAY, AWAY, self.n), v[s > TRUNCATED * s.max(initial=0.0)]
+        return self.moved_by(point, self.scales(point)[1] * (way - v.T @ (v @ way)))
+
     def scales(self, point: dict[str, float]) -> tuple[Array, Array]:
         """Factors of rows and columns by what J is about a state; a displacement of 1 turns rows."""
+        if self.scale is not None:
+            return self.scale
         typical = self.typical(point, self.reach)
-        rows, columns = factors(self.constraints, typical)
+        rows, columns = factors(typical)
         acting = typical.any(axis=0)
         longer = np.exp(np.mean(np.log(self.reach[acting] / columns[acting]))) if acting.any() else 1.0
         return rows / longer, columns * longer
+
+    def scaled(self, point: dict[str, float], matrix: Array | None = None) -> Array:
+        """J free of units."""
+        rows, columns = self.scales(point)
+        return rows[:, None] * (self.matrix(point) if matrix is None else matrix) * columns
+
+    def openings(self, points: Sequence[dict[str, float]]) -> Array:
+        """Gaps of rows at states, of the size of their loops, (states, m); 0 of rows of velocities."""
+        found = np.zeros((len(points), len(self.constraints)))
+        for row, point in zip(found, points, strict=True):
+            gaps = self.gaps(point)
+            row[: len(gaps)] = np.abs(self.scales(point)[0][: len(gaps)] * gaps)
+        return found
 
     def gaps(self, point: Mapping[str, float]) -> Array:
         """phi."""
         return np.zeros(0) if self.phi is None else np.array(_numbers(self.phi, point))
 
-    def gap_rounding(self, point: Mapping[str, float]) -> Array:
-        """What rounding of the state, or on the way, can make of each row, (m,); 0 of rows of velocities."""
-        sizes = np.zeros(len(self.constraints))
-        if self.phi is not None:
-            roundoff = np.finfo(float).eps / 2.0
-            bounds = _shared.error_bounds(self.phi.nodes, point, roundoff, of_inputs=roundoff)[1]
-            sizes[: len(self.phi.outputs)] = [float(bounds[node]) for node in self.phi.outputs.values()]
-        return sizes
+    def flat(self, point: dict[str, float], matrix: Array) -> NDArray[np.bool_]:
+        """Rows of phi that a displacement opens by far more than their slopes say, (m,), as of a square that is met.
 
-    def _open_rows(self, before: Mapping[str, float], step: Array, most: float = OPEN) -> Indices:
+        Of the shortest displacement that opens the row by far more than its rounding.  matrix: J at the state.
+        """
+        flat = np.zeros(len(self.constraints), dtype=bool)
+        if self.phi is None:
+            return flat
+        roundoff, outputs = np.finfo(float).eps / 2.0, self.phi.outputs.values()
+        values, bounds = _shared.error_bounds(self.phi.nodes, point, roundoff, of_inputs=roundoff)
+        closed = np.array([abs(float(values[node])) + float(bounds[node]) for node in outputs])
+        left, way = np.arange(len(closed)), self.scales(point)[1] * np.random.default_rng(0).uniform(-1.0, 1.0, self.n)
+        for size in SIZES:
+            there = np.abs(self.gaps(self.point(self.moved_by(point, size * way), point)))
+            opened = left[there[left] > OPENED * closed[left]]
+            flat[opened] = there[opened] > FLAT * np.linalg.norm(size * way * matrix[opened], axis=1)
+            left = np.setdiff1d(left, opened)
+        return flat
+
+    def _open_rows(self, before: Mapping[str, float], step: Array) -> Indices:
         """The rows of phi that are not 0 to their rounding, that of the step included, after a step."""
         if self.landed is None:
             return np.zeros(0, dtype=np.intp)
         point = {**before, **dict(zip(self.steps, step.tolist(), strict=True))}
         values, digits = self.landed.evaluate(point), extend.certain_digits(self.landed, point)
-        wrong = [x != 0.0 and not (digits[name] < most and np.isfinite(x)) for name, x in values.items()]
+        wrong = [x != 0.0 and not (digits[name] < OPEN and np.isfinite(x)) for name, x in values.items()]
         return np.flatnonzero(wrong)
 
     def point(self, q: Array, shown: Mapping[str, float]) -> dict[str, float]:
@@ -274,32 +358,14 @@ def balance(matrix: Array) -> tuple[Array, Array]:
     return rows, columns
 
 
-def factors(constraints: Constraints, matrix: Array) -> tuple[Array, Array]:
-    """Factors of rows, one for each loop, and of columns, which make J free of units and its largest entries 1.
-
-    Rows of angles stand beside those of lengths by the longest lever that a joint of the loop has.
-    """
-    rows, columns = np.ones(len(matrix)), np.ones(matrix.shape[1])
-    groups: dict[str, list[int]] = {}
-    for k, name in enumerate(constraints.names[: len(matrix)]):
-        looped = constraints.loop_rows.get(name)
-        groups.setdefault(name if looped is None else f"loop {looped.loop}", []).append(k)
-        if looped and not looped.angle:
-            rows[k] = -1.0  # a length
-    for members in groups.values():
-        straight = [k for k in members if rows[k] < 0.0]
-        lever = np.abs(matrix[straight][:, constraints.turning]).max(initial=0.0)
-        rows[straight] = 1.0 / (lever or 1.0)
-    largest = [np.abs(rows[members, None] * matrix[members]).max(axis=0) for members in groups.values()]
-    scales, columns = alike(np.array(largest).reshape(-1, matrix.shape[1]))
-    for members, scale in zip(groups.values(), scales, strict=True):
-        rows[members] *= scale
+def factors(matrix: Array) -> tuple[Array, Array]:
+    """Factors of rows and columns, of any units, which make the largest entries of columns 1 and rows no longer."""
+    rows, columns = alike(np.abs(matrix))
     for _ in range(ROUNDS):
         sizes = np.abs(rows[:, None] * matrix * columns).max(axis=0, initial=0.0)
         columns /= np.where(sizes > 0.0, sizes, 1.0)
         lengths = np.linalg.norm(rows[:, None] * matrix * columns, axis=1)
-        for members in groups.values():
-            rows[members] /= lengths[members].max() or 1.0
+        rows /= np.where(lengths > 0.0, lengths, 1.0)
     return rows, columns
 
 

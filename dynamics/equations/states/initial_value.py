@@ -54,6 +54,13 @@ def given_state(model: Model, q: ArrayLike, qd: ArrayLike | None) -> Array:
     return normalized(model, np.concatenate(_state_parts(model, q, qd, many=False)))
 
 
+def note_start(model: Model, q: ArrayLike, qd: ArrayLike | None, t: float) -> None:
+    """The rank of constraints is looked for at this state first."""
+    if model.system is not None and len(model.system.constraints):
+        x = given_state(model, q, qd)
+        model.system.constraints.given[:] = [(x[: model.system.nq], t, model.system.parameters)]
+
+
 def start_state(model: Model, q: ArrayLike, qd: ArrayLike | None, bound: Mapping[str, float], t: float = 0.0) -> Array:
     """The state (m,) in which a motion starts at t [s], the other inputs as they are `bound`.
 

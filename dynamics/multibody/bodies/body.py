@@ -319,6 +319,19 @@ def unknown_body(sentence: str, name: object, known: Iterable[str]) -> Mechanism
     return MechanismError(f"{sentence}; {or_nearest(str(name), near)}" if near else sentence)
 
 
+def body_name(bodies: Sequence[Body], given: str, what: str = "") -> str:
+    """Name of the body that is called so, or whose joint is. Raises MechanismError where there is none.
+
+    what: it is looked for, such as "to lock ".
+    """
+    if not isinstance(given, str):
+        raise MechanismError(f"a body is named by a string, got {type(given).__name__}: {given!r:.60}")
+    known = {body.coordinate: body.name for body in bodies} | {body.name: body.name for body in bodies}
+    if given not in known:
+        raise unknown_body(f"there is no body {given!r:.80} {what}in the mechanism", given, known)
+    return known[given]
+
+
 def checked_name(what: str, name: str, *, spaces: bool = True) -> None:
     """Raises MechanismError for what is no name."""
     try:

@@ -20,6 +20,7 @@ from .body import (
     Body,
     Joint,
     MechanismError,
+    body_name,
     check_limits,
     checked_name,
     checked_rotation,
@@ -83,9 +84,8 @@ def locked_parts(bodies: Sequence[Body], locked: Mapping[str, float | ArrayLike]
     """
     by_name = {body.name: body for body in bodies}
     result: dict[str, float | ArrayLike] = {}
-    for name, value in require_mapping("locked", locked, "body: coordinate").items():
-        if name not in by_name:
-            raise MechanismError(f"there is no body {name!r:.80} to lock in the mechanism")
+    for given, value in require_mapping("locked", locked, "body: coordinate").items():
+        name = body_name(bodies, given, "to lock ")
         count = len(COMPOSITIONS.get(by_name[name].joint.kind, ()))
         if not count:
             result[name] = value

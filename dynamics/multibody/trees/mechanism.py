@@ -20,7 +20,7 @@ from ...systems.body_terms import BodyTerms
 from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
-from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, unknown_body, vector
+from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, body_name, quantities, vector
 from ..bodies.composed_joints import locked_parts, outer_names, require_parents
 from ..bodies.joint_coordinates import (
     coordinate_names,
@@ -126,6 +126,7 @@ class Mechanism(Structure):
         for name, value in require_mapping("parameters", self.parameters, "name: value").items():
             parameter_value(name, value)  # before one is put in
         self._require_values(self.parameters, parts)
+        check_loops(self.loops, self.bodies)
         seen: set[str] = set()
         for name in self.coordinates:
             if name in seen:
@@ -134,7 +135,6 @@ class Mechanism(Structure):
         carried = {body.name for body in self.bodies}
         for force in self.forces:
             check_any_force(force, carried, self.bodies)
-        check_loops(self.loops, self.bodies)
         used = used_names(self.bodies, self.gravity, self.forces)
         for name in self.parameters:
             if name not in used:
@@ -157,7 +157,7 @@ class Mechanism(Structure):
         """All bodies as the equations have them, parents first: a locked joint a weld, those of several parts apart."""
         parts = [part for body in self.bodies for part in checked_parts(body)]
         require_parents(self.bodies)
-        return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.locked))))
+        return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.standing))))
 
     @property
     def moving(self) -> tuple[Body, ...]:
@@ -238,7 +238,7 @@ class Mechanism(Structure):
             damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
             constraints=lambda q, t: position_rows(
-                self.loops, self.moving, self.carriers, self.locked, self._equations.states(q, ())
+                self.loops, self.moving, self.carriers, self.standing, self._equations.states(q, ())
             ),
             velocity_constraints=lambda q, qd, t: velocity_rows(self.loops, lambda body: self._chain(body, q, qd)),
             body_terms=BodyTerms(self._equations, lengths(self._bound.moving), regular, self._require_values),
@@ -313,9 +313,8 @@ class Mechanism(Structure):
 
     def chain(self, body: str) -> KinematicChain:
         """The joints between a body and the world, at q0.. and qd0... Raises MechanismError for an unknown body."""
-        if not isinstance(body, str) or body not in self.carriers:
-            raise unknown_body(f"there is no body {body!r:.80} in the mechanism", body, self.carriers)
-        return self._chain(body, self.system.q, self.system.qd)
+        name = body if isinstance(body, str) and body in self.carriers else body_name(self.bodies, body)
+        return self._chain(name, self.system.q, self.system.qd)
 
     def joint_positions(self, q: ArrayLike) -> Array:
         """Places of joints and tips [m] in a drawing, (T, k, 2), x to the right and y up, for q, (T, n) [rad or m].
@@ -358,7 +357,7 @@ class Mechanism(Structure):
                 raise ValueError(f"{name} must have shape ({count},), one for each joint, got {row.shape}")
         states = zip(other.moving, places(other.moving), strict=True)
         theirs = {body.name: (rows[0][place.q], rows[1][place.u]) for body, place in states}
-        locked = locked_parts(other.bodies, other.locked)
+        locked = locked_parts(other.bodies, other.standing)
         result = np.array(neutral(self.moving)), np.zeros(len(self.velocities))
         for body, place in zip(self.moving, places(self.moving), strict=True):
             if body.name in theirs:

@@ -21,14 +21,14 @@ from ..bodies.body import (
     WORLD,
     Body,
     MechanismError,
+    body_name,
     checked,
     quantities,
-    unknown_body,
 )
 from ..bodies.composed_joints import parts_of
 from ..forces.contact import CONTACT_QUANTITIES, Contact
 from ..forces.joint_force import AnyForce, JointForce
-from ..loops import Loop
+from ..loops import Loop, coupled
 from ..parameters import Quantities, bound, entries, evaluated, names_in
 
 
@@ -103,14 +103,25 @@ class Structure(HoldsNodes):
         names = [each for force in self.forces for each in force.components if isinstance(each, str)]
         return dict.fromkeys(names, 0.0) | dict(self.parameters)
 
+    @property
+    def standing(self) -> dict[str, float | ArrayLike]:
+        """Coordinates of joints that are locked, and of those that couplings hold to them."""
+        standing = {body_name(self.bodies, name, "to lock "): at for name, at in self.locked.items()}
+        for _ in self.loops:
+            for loop in self.loops:
+                standing |= coupled(loop, standing)
+        return standing
+
     def lock(self, body: str, at: float | ArrayLike | None = None) -> Self:
         """The mechanism with the joint of a body standing still at a coordinate [rad or m], or several; by default 0.
 
+        body: its name, or its joint's, as in `unlock`, `subtree`, `detach` and `attach`.
         Of a ball or free joint the coordinates are as many as it has, by default neutral.
-        The body and all that is welded to it become one inertia with its parent. Raises MechanismError for an unknown
+        The body and all that is welded to it become one inertia with its parent. A joint that a coupling holds to it
+        stands still, too, and loops that then hold nothing are checked. Raises MechanismError for an unknown
         body or one without a joint, and a coordinate that is not finite.
         """
-        _check_body(body)
+        body = body_name(self.bodies, body, "to lock ")
         if at is None:
             known = [each.joint.neutral for each in self.bodies if each.name == body]
             at = known[0] if known and len(known[0]) != 1 else 0.0
@@ -118,13 +129,14 @@ class Structure(HoldsNodes):
 
     def unlock(self, body: str) -> Self:
         """The mechanism with a locked joint free again. Raises MechanismError for one that is not locked."""
-        _check_body(body)
+        body = body_name(self.bodies, body, "to unlock ")
         if body not in self.locked:
             raise MechanismError(f"the joint of body {body!r:.80} is not locked")
         return replace(self, locked={name: at for name, at in self.locked.items() if name != body})
 
     def subtree(self, body: str) -> Subtree:
         """A body and all that it carries, as `attach` takes it. Raises MechanismError for an unknown body."""
+        body = body_name(self.bodies, body)
         names = descendants(self.bodies, body)
         bodies = {each.name: (place, each) for place, each in enumerate(self.bodies) if each.name in names}
         order = [body, *(name for name in bodies if name != body)]
@@ -146,7 +158,7 @@ class Structure(HoldsNodes):
 
         Raises MechanismError for an unknown body.
         """
-        names = descendants(self.bodies, body)
+        names = descendants(self.bodies, body_name(self.bodies, body))
         return changed(
             self,
             bodies=tuple([each for each in self.bodies if each.name not in names]),
@@ -163,8 +175,8 @@ class Structure(HoldsNodes):
         Mechanism does, also for a loop of the subtree with a body that is not there.
         """
         given = as_subtree(subtree)
-        if to is not None:
-            _check_body(to)
+        if to not in (None, WORLD) and any(to in (each.name, each.joint.name) for each in self.bodies):
+            to = body_name(self.bodies, to)
         for name, value in given.parameters.items():
             if (known := self.parameters.get(name, value)) != value:
                 raise MechanismError(
@@ -193,11 +205,7 @@ def as_subtree(given: Subtree | Body | Iterable[Body]) -> Subtree:
 
 
 def descendants(bodies: Iterable[Body], root: str) -> set[str]:
-    """Names of the body and of all that it carries. Raises MechanismError for an unknown body."""
-    bodies = list(bodies)
-    names = {body.name for body in bodies}
-    if not isinstance(root, str) or root not in names:
-        raise unknown_body(f"there is no body {root!r:.80} in the mechanism", root, names)
+    """Names of the body and of all that it carries."""
     children: dict[str, list[str]] = {}
     for body in bodies:
         children.setdefault(body.parent, []).append(body.name)
@@ -224,11 +232,6 @@ def held(force: AnyForce) -> set[str]:
     if isinstance(force, JointForce):
         return {*force.shares}
     return {force.body, force.to} if isinstance(force, Contact) else {force.body}
-
-
-def _check_body(body: object) -> None:
-    if not isinstance(body, str):
-        raise MechanismError(f"a body is named by a string, got {type(body).__name__}: {body!r:.60}")
 
 
 AnyStructure = TypeVar("AnyStructure", bound=Structure)

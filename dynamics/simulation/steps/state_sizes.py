@@ -11,7 +11,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array, error_bounds
+from cgraph._shared import Array, error_bounds, output_bounds
 from cgraph.extend import topological
 
 from ...equations.state_equation import state_inputs
@@ -21,6 +21,7 @@ from .row_values import values_of
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 OTHERS = 1e-4  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
+MOVES = 10.0  # bounds of rounding: a rate beyond them is none of it alone
 ROUNDING_SIZE = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 
 
@@ -99,10 +100,10 @@ def state_kinds(problem: Problem) -> StateKinds:
 
 
 def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
-    """The kinds with the floor of their errors: bounds of what rounding does to the neutral state, at rest.
+    """The kinds with the floor of their errors: what rounding does to the neutral state, if it rests but for that.
 
-    A body drawn upright in axes that are not the world's rests but for rounding, and steps that resolved the motion
-    that this starts would be without number. Nothing is rounded along the axes of the world.
+    A body drawn upright in axes that are not the world's rests so, and steps that resolved the motion that this starts
+    would be without number. Nothing is rounded along the axes of the world.
     """
     if problem.system is None or problem.momenta:
         return kinds
@@ -110,11 +111,11 @@ def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
     point = dict.fromkeys(problem.rate.input_names, 0.0)
     point |= {name: float(known[name]) for name in problem.parameters if name in known}
     point |= dict(zip(problem.states, problem.system.kinematics.neutral, strict=False))
-    pushed, at_once = _rounding(problem.rate, point), np.zeros(problem.size)
-    if problem.projection is not None:
-        at_once = _rounding(problem.projection, point)
-    pushed[: problem.nq] = 0.0
-    if not (pushed.any() or at_once.any()):
+    pushed = _rounding(problem.rate, point)
+    at_once: Array | None = np.zeros(problem.size)
+    if pushed is not None and problem.projection is not None:
+        at_once = _rounding(problem.projection, point, rests=False)
+    if pushed is None or at_once is None or not (pushed.any() or at_once.any()):
         return kinds
     turned = np.zeros(problem.size)  # coordinates by the velocities that move them
     for k, those in enumerate(kinds.moved):
@@ -125,13 +126,19 @@ def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
     return replace(kinds, floor=cg.simplify(_numbered([time], [a + time * (b + time * c) for a, b, c in rows])))
 
 
-def _rounding(graph: Graph, point: Mapping[str, float]) -> Array:
-    """Bounds of the rounding errors of the outputs at a point; 0 of one that has no finite bound there."""
-    outputs = list(graph.outputs.values())
-    errors = error_bounds(topological(outputs), {name: point[name] for name in graph.input_names}, 2.0**-53)[1]
-    bounds = np.array([float(errors[node]) for node in outputs])
-    result: Array = np.where(np.isfinite(bounds), bounds, 0.0)
-    return result
+def _rounding(graph: Graph, point: Mapping[str, float], *, rests: bool = True) -> Array | None:
+    """Bounds of the rounding errors of the outputs at a point; None where some are not finite.
+
+    rests: or where outputs are more than their errors; the wider bounds, which cost less, tell most of these.
+    """
+    outputs, roundoff = list(graph.outputs.values()), 2.0**-53
+    nodes, inputs = topological(outputs), {name: np.array([point[name]]) for name in graph.input_names}
+    found, errors = error_bounds(nodes, inputs, roundoff)
+    values, wide = (np.array([np.ravel(each[node])[0] for node in outputs]) for each in (found, errors))
+    if not np.isfinite(wide).all() or (rests and (np.abs(values) > MOVES * wide).any()):
+        return None
+    bounds: Array = output_bounds(nodes, outputs, inputs, roundoff, 0.0, float)[1][:, 0]
+    return None if rests and (np.abs(values) > MOVES * bounds).any() else bounds
 
 
 def off_by(errors: Array, scale: Array, allowed: Array, components: tuple[str, ...]) -> str:

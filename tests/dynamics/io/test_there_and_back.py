@@ -165,7 +165,7 @@ def test_random_trees_and_loops_come_back_or_are_refused(
     [
         ([Loop("distance", "b", "a", length=1.0, name="rod")], "MJCF has no loop of the kind 'distance', as is 'rod'"),
         ([Loop("coupling", "b", "a", coefficients=[0, 1, 0, 0, 0, 2], name="cam")], "loop 'cam' is of more"),
-        ([Loop("coupling", "b", "c", name="gear")], "loop 'gear' couples that of 'c'"),
+        ([Loop("coupling", "b", "c", name="gear")], "loop 'gear' couples that of 'b'"),
     ],
 )
 def test_a_loop_that_mjcf_has_not_is_refused_by_name(loops: list[Loop], message: str) -> None:
