@@ -124,9 +124,10 @@ def test_planar_loops_in_oblique_axes_of_7_digits_close_to_7_digits(machine: Cal
     assert np.abs(whole.gaps(point)).max() < 1e-6
 
 
-def test_rows_that_open_are_kept_in_a_row_of_windows() -> None:
+@pytest.mark.parametrize("count", [10, *slow(20, 40)])
+def test_rows_that_open_are_kept_in_a_row_of_windows(count: int) -> None:
     """As drawn they lie flat, where half of the rows say nothing."""
-    model, q, qd = windows(20)
+    model, q, qd = windows(count)
     with warnings.catch_warnings(action="error", category=dyn.ConstraintWarning):
         run = dyn.simulate(model, -np.array(q), qd, 1.0)
     numbers = row_numbers(model.system.constraints)
