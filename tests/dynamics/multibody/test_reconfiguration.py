@@ -30,9 +30,7 @@ def arm(n: int, seed: int = 0) -> dyn.Mechanism:
 
 
 def torque(mechanism: dyn.Mechanism, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    graph = dyn.inverse_dynamics(mechanism)
-    values = dict(zip(graph.input_names, [*q, *qd, *qdd], strict=True))
-    return np.array(list(graph.evaluate(values).values()))
+    return dyn.arrays_at(mechanism, dyn.inverse_dynamics(mechanism), q, qd, qdd)["tau"]
 
 
 LOCKED: dict[str, tuple[float, ...]] = {
