@@ -181,12 +181,18 @@ def test_a_root_link_called_world_floats_as_any_other() -> None:
     assert compiled(heavy.replace('"base"', '"world"'), floating=True).nq == 10
 
 
+NO_AXIS = "<axis xyz='0 0 0'/>"  # which has no meaning there
+
+
 def test_what_cannot_float_is_said() -> None:
     with raises(TypeError, match="floating must be True or False"):
         dyn.load_urdf(URDF, floating="base")  # type: ignore[arg-type]
     hung = robot(
-        link("world"), link("a", 1.0, np.eye(3)), joint("j", "floating", "world", "a", "<origin xyz='0 0 1'/>")
+        link("world"),
+        link("a", 1.0, np.eye(3)),
+        joint("j", "floating", "world", "a", "<origin xyz='0 0 1'/>" + NO_AXIS),
     )
+    assert dyn.load_urdf(hung).coordinates == tuple([f"j.{name}" for name in ("x", "y", "z", "qw", "qx", "qy", "qz")])
     assert np.asarray(dyn.load_urdf(hung).bodies[0].joint.position).tolist() == [0.0, 0.0, 1.0]
     importorskip("mujoco")
     with raises(MechanismError, match="in MuJoCo a free joint has the axes and the origin of the world"):
