@@ -179,5 +179,7 @@ def test_an_event_is_what_it_says() -> None:
         dyn.Event("e", lambda q, qd, t: q[0], terminal="no")  # type: ignore[arg-type]
     with raises(TypeError, match="event 'e': reset must be a function, got 3"):
         dyn.Event("e", lambda q, qd, t: q[0], reset=3)  # type: ignore[arg-type]
+    with raises(ValueError, match="direction must be 1, -1 or 0, got 2"):
+        dyn.Event("e", lambda q, qd, t: q[0], direction=2)
     with raises(ValueError, match="event 'e': a run that ends there goes on from no reset state"):
         dyn.Event("e", lambda q, qd, t: q[0], terminal=True, reset=lambda q, qd, t: (q, qd))

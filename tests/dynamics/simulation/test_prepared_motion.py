@@ -278,7 +278,7 @@ def test_single_steps_are_of_plain_motions() -> None:
             dyn.prepare(ARM).start(*START).propagate_until(wrong)
 
 
-FIXED = {"method", "dt", "rtol", "max_steps", "max_step", "first_step", "events"}
+FIXED = {"method", "dt", "rtol", "max_steps", "max_step", "first_step"}
 SHORT = (1e-17, 1e-13)  # beside the span of a run, which is not known yet
 OWN: list[tuple[dict[str, Any], str]] = [
     ({"dense_output": 1}, "dense_output"),
