@@ -28,7 +28,7 @@ def test_kinetic_only_is_right_at_any_dt_for_one_joint_and_before_the_embedding(
 
 
 @each_row("name", MODELS)
-def test_the_torque_tends_to_tau_and_dl_dq_by_definition_and_to_tau_and_dk_dq_of_k_alone(name: str) -> None:
+def test_by_definition_the_torque_tends_to_tau_and_dl_dq_and_of_k_alone_to_tau_and_dk_dq(name: str) -> None:
     """With explicit time, terms linear in velocity, damping and forces; in first order where it is not so at once."""
     model = MODELS[name]()
     state = at(states(model, 1, seed=6), 0)

@@ -57,3 +57,15 @@ def test_spurious_is_the_branch_of_the_spring() -> None:
     assert {"k", "dt", "q0_old", "qd0_old"} <= {node.name for node in gone}
     right = dyn.momentum_rate(SPRING_MASS, "kinetic_only_exact")
     assert len(right.nodes) == len(kept) - 1
+
+
+@mark.parametrize("formulation", RIGHT)
+def test_nothing_is_spurious_in_a_right_formulation_of_one_joint(formulation: str) -> None:
+    assert dyn.spurious_nodes(dyn.inverse_dynamics(SPRING_MASS, formulation)) == frozenset()
+    assert dyn.spurious_nodes(dyn.momentum_rate(SPRING_MASS, formulation)) == frozenset()
+
+
+def test_the_chain_rule_has_no_trace_of_the_euler_relation() -> None:
+    graph = dyn.inverse_dynamics(SPRING_MASS, "chain_rule")
+    assert not {"dt", "q0_old", "qd0_old"} & set(graph.input_names)
+    assert "Euler relation" not in graph.counts().by_tag
