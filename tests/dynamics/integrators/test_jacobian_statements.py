@@ -29,17 +29,16 @@ def test_the_statements_give_the_jacobian_of_the_rate(links, compressed, backend
 
 
 def test_radau_keeps_what_serves_the_next_step():
-    """Of a damped spring that is stiff, with its error held all the same; rodas takes a Jacobian in every step."""
+    """Of a damped spring that is stiff, with its error held all the same."""
     rates = lambda x, t: [x[1], -2e3 * x[1] - 2e3 * x[0] - x[0] ** 3]  # noqa: E731
     model = dyn.OdeSystem(rates, ["x", "v"])
     fine = dyn.simulate(model, [1.0, 0.0], None, 3.0, "radau", rtol=1e-11)
     run = dyn.simulate(model, [1.0, 0.0], None, 3.0, "radau", rtol=1e-7)
     stats = run.stats
-    assert stats.njev < 0.5 * stats.steps
-    assert stats.nlu < 1.5 * (stats.steps + stats.rejected)  # two of each pair
+    assert 0 < stats.njev < 0.5 * stats.steps
+    assert 0 < stats.nlu < 1.5 * (stats.steps + stats.rejected)  # two of each pair
+    assert stats.nlu % 2 == 0
     assert run.q[-1] == pytest.approx(fine.q[-1], rel=1e-6)
-    rodas = dyn.simulate(model, [1.0, 0.0], None, 3.0, "rodas", rtol=1e-7).stats
-    assert rodas.njev == rodas.steps
     event = dyn.Event("half", lambda x, t: x[0] - 0.5)
     watched = dyn.simulate(model, [1.0, 0.0], None, 3.0, "radau", rtol=1e-7, events=event).stats
     assert (watched.njev, watched.nlu) == (stats.njev, stats.nlu)

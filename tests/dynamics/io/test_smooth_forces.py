@@ -185,21 +185,6 @@ def test_a_limit_gives_back_what_it_took_but_for_its_damping(side: float, unit: 
         assert (side * run.forces[:, 0] <= 0.0).all()
 
 
-def test_joint_forces_go_with_their_bodies() -> None:
-    arm = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
-    servo = dyn.Actuator("link 2", "target", gain=(9.0, 0.0, 0.0), bias=(0.0, -9.0, 0.0))
-    model = dyn.Mechanism(arm.bodies, arm.gravity, [servo, dyn.JointLimit("link 1", -1.0, 1.0, 1e3)], {"target": 0.3})
-    assert dict(model.system.parameters) == {"target": 0.3}
-    taken = model.subtree("link 2")
-    assert taken.forces == (servo,)
-    assert model.detach("link 2").attach(taken).system.parameters == {"target": 0.3}
-    assert [force.body for force in model.detach("link 2").forces] == ["link 1"]
-    still = model.lock("link 2", 0.2)
-    bare = dyn.Mechanism(still.bodies, still.gravity, locked=still.locked)
-    state = {"q0": 0.4, "qd0": 0.1, "tau0": 0.0}
-    assert dyn.forward_dynamics(still).evaluate({**state, "target": 5.0}) == dyn.forward_dynamics(bare).evaluate(state)
-
-
 @mark.parametrize(
     ("force", "message"),
     [

@@ -64,7 +64,5 @@ def test_what_joints_of_several_freedoms_cannot_have_is_said() -> None:
     assert turning.velocities == ("b.wx", "b.wy", "b.wz", "c")
     with raises(dyn.MechanismError, match="a quaternion must not be zero"):
         _ = turning.lock("b", (0.0, 0.0, 0.0, 0.0)).coordinates
-    with raises(dyn.MechanismError, match=r"must be \(4,\) finite numbers"):
-        _ = turning.lock("b", 0.3).coordinates
     with raises(dyn.MechanismError, match="no inertia"):
         _ = dyn.Mechanism([dyn.Body("b", dyn.Joint("ball"), mass=1.0)]).moving

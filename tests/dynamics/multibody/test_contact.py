@@ -293,20 +293,6 @@ def test_parameters_of_a_contact_are_inputs_and_are_bound() -> None:
     assert vanishes(replace(softer.forces[0], friction=0.0).friction)
 
 
-def test_a_contact_goes_with_the_bodies_that_it_is_between() -> None:
-    arm = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
-    inner = dyn.Contact("link 1", radius=0.1, stiffness="k")
-    between = dyn.Contact("link 2", "link 1", radius=0.1, to_radius=0.2, stiffness=1e3)
-    model = dyn.Mechanism(arm.bodies, arm.gravity, [inner, between], {"k": 1e4})
-    for body in ("link 2", "link 1"):
-        taken = model.subtree(body)
-        assert between in taken.forces
-        assert between not in model.detach(body).forces
-        assert set(model.detach(body).attach(taken).forces) == {inner, between}
-    assert dict(model.detach("link 1").parameters) == {}
-    assert model.lock("link 2", 0.3).forces == (inner, between)
-
-
 BAD: dict[str, tuple[dict[str, Any], str]] = {
     "nobody": ({"body": "nobody"}, "there is a contact on the unknown body 'nobody'"),
     "no other": ({"to": "nobody"}, "there is a contact on the unknown body 'nobody'"),

@@ -6,10 +6,8 @@ import numpy as np
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from tests.dynamics.mechanisms import random_body, random_inertia
+from tests.dynamics.mechanisms import Array, random_body, random_inertia
 from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM, SOLVED, SUMS
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def arm(n: int = 3, seed: int = 0, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dyn.Mechanism:
@@ -28,11 +26,6 @@ def load(seed: int = 5) -> dyn.Body:
     return dyn.Body("load", grip, "b2", 0.7, 0.1 * rng.normal(size=3), random_inertia(rng))
 
 
-def values(graph: Any, **groups: Array) -> dict[str, Any]:
-    given = {f"{name}{i}": x for name, row in groups.items() for i, x in enumerate(row)}
-    return {name: float(value) for name, value in graph.evaluate(given).items()}
-
-
 def placed(mechanism: dyn.Mechanism, body: str, at: Any, q: Array) -> dict[str, Array]:
     """Where a point is, the body's axes, and the Jacobian of both."""
     frame = mechanism, body, at
@@ -41,14 +34,12 @@ def placed(mechanism: dyn.Mechanism, body: str, at: Any, q: Array) -> dict[str, 
     )
 
 
+def mass(mechanism: dyn.Mechanism, q: Array) -> Array:
+    return dyn.arrays_at(mechanism, dyn.mass_matrix(mechanism), q)["M"]
+
+
 def kinetic(mechanism: dyn.Mechanism, q: Array, qd: Array) -> float:
-    n = len(q)
-    m = np.array(list(values(dyn.mass_matrix(mechanism), q=q, qd=qd).values())).reshape(n, n)
-    return float(qd @ m @ qd) / 2.0
-
-
-def turn(moves: dict[str, float]) -> Array:
-    return np.array([[moves[f"R_{i}_{j}"] for j in range(3)] for i in range(3)])
+    return float(qd @ mass(mechanism, q) @ qd) / 2.0
 
 
 @mark.parametrize("seed", range(4))
@@ -59,7 +50,7 @@ def test_the_energy_lost_is_that_of_an_inelastic_impact(seed: int) -> None:
     q, qd, v, w = rng.normal(size=(4, 3))
     found = dyn.attach_with_impact(holder, q, qd, body, velocity=v, omega=w)
     place = np.asarray(body.joint.position) + np.asarray(body.center)
-    m = np.array(list(values(dyn.mass_matrix(holder), q=q, qd=qd).values())).reshape(3, 3)
+    m = mass(holder, q)
     where = placed(holder, "b2", place, q)
     j, r = where["J"], where["R"]
     own = np.block([[body.mass * np.eye(3), np.zeros((3, 3))],
@@ -93,9 +84,8 @@ def test_a_body_can_be_caught_on_a_hinge_and_by_a_locked_arm() -> None:
     q, qd = np.random.default_rng(2).normal(size=(2, 3))
     found = dyn.attach_with_impact(holder, q, qd, hook)
     assert (found.q.shape, found.q[3]) == ((4,), 0.0)
-    spin = values(found.mechanism.motion("load"), q=found.q, qd=found.qd)
-    axis = turn(values(found.mechanism.motion("load"), q=found.q, qd=found.qd))[:, 2]
-    assert float(axis @ [spin["wx"], spin["wy"], spin["wz"]]) == approx(0.0, abs=LONG_SUM)
+    moves = dyn.arrays_at(found.mechanism, found.mechanism.motion("load"), found.q, found.qd)
+    assert moves["R"][:, 2] @ [moves[f"w{axis}"] for axis in "xyz"] == approx(0.0, abs=LONG_SUM)
     held = dyn.attach_with_impact(holder.lock("b2", 0.3), q[:2], qd[:2], load())
     assert held.qd.shape == (2,)
     assert held.energy > 0.0

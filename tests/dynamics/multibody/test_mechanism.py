@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from pytest import approx, mark, raises
 
-import cgraph as cg
 import dynamics as dyn
 from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion, rotation, to_quaternion
@@ -52,19 +51,9 @@ def test_the_order_of_the_bodies_only_orders_the_coordinates() -> None:
     assert run(dyn.forward_dynamics(turned_round), shuffled) == approx(ours[:, order], rel=SOLVED)
 
 
-def values(graph: cg.Graph, **inputs: float) -> list[float]:
-    return list(graph.evaluate(inputs).values())
-
-
-def test_a_coordinate_without_mass_moves_its_armature() -> None:
-    mechanism = Mechanism([Body("rotor", Joint("revolute", armature=0.25))])
-    assert values(dyn.forward_dynamics(mechanism), q0=0.1, qd0=0.2, tau0=1.0) == approx([4.0])
-
-
 SIZES = [
     (turned_arm(7), "forward", 1639),
     (turned_arm(30), "forward", 9196),
-    (turned_arm(7), "inverse", 774),
     (turned_arm(30), "inverse", 3901),
     (dyn.planar_arm([0.9] * 20, [0.7] * 20), "forward", 1703),
 ]
@@ -121,7 +110,8 @@ def test_a_weld_leaves_no_nodes() -> None:
 def test_a_weld_s_inertia_counts_without_mass() -> None:
     """As of a flywheel whose mass is counted elsewhere; its carrier may have none either."""
     shaft, wheel = Body("shaft", Joint("revolute")), Body("wheel", Joint("fixed"), "shaft", inertia=(0.1, 0.1, 0.2))
-    assert values(dyn.forward_dynamics(Mechanism([shaft, wheel])), q0=0.0, qd0=0.0, tau0=1.0) == approx([5.0])
+    at = {"q0": 0.0, "qd0": 0.0, "tau0": 1.0}
+    assert dyn.forward_dynamics(Mechanism([shaft, wheel])).evaluate(at) == {"qdd0": approx(5.0)}
 
 
 def hinge(**given: Any) -> Joint:
@@ -157,9 +147,6 @@ BAD = [
     ({"inertia": (-1.0, 1.0, 1.0)}, "body 'a': inertia must not be negative, its principal moments are [-1.0"),
     ({"mass": "too heavy"}, "the name of a parameter of body 'a': mass must be without white space"),
     ({"mass": np.inf}, "body 'a': mass must be finite and at least 0, got inf kg"),
-    ({"joint": hinge(damping=np.nan)}, "body 'a': damping must be finite and at least 0, got nan"),
-    ({"joint": hinge(stiffness=np.inf)}, "body 'a': stiffness must be finite and at least 0, got inf"),
-    ({"joint": hinge(axis=(0, np.nan, 1))}, "body 'a': axis must be (3,) finite numbers"),
     ({"joint": hinge(orientation=np.full((3, 3), np.nan))}, "body 'a': orientation must be (3, 3) finite numbers"),
     (
         {"mass": 1e308, "center": (1.0, 1.0, 1.0)},

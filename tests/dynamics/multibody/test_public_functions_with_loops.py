@@ -23,15 +23,10 @@ STILL = np.zeros(3)
 TAU = {"tau": [0.4, 0.1, -0.2]}
 
 
-def at_rest(graph: cg.Graph, model: Any = MODEL) -> Array:
+def at_rest(graph: cg.Graph) -> Array:
     """Accelerations there, of the outputs of a graph."""
-    arrays = dyn.arrays_at(model, graph, Q, STILL, **TAU)
-    return np.array([value for name, value in arrays.items() if name in ("qdd", "qd_dot")]).ravel()
-
-
-def rates(graph: cg.Graph) -> Array:
-    values = dyn.arrays_at(MODEL, graph, Q, STILL, **TAU)
-    return np.array([values[f"qd{i}_dot"] for i in range(3)])
+    arrays = dyn.arrays_at(MODEL, graph, Q, STILL, **TAU)
+    return np.array([value for name, value in arrays.items() if name.startswith("qd") and name != "qd"]).ravel()
 
 
 def caught() -> tuple[Array, Array]:
@@ -56,7 +51,7 @@ def columns(run: Sensitivities) -> tuple[Array, Array]:
 # A configuration, and what the loop has to let through there: velocities, accelerations from rest, or columns of them.
 HELD: dict[str, Callable[[], tuple[Array, Array]]] = {
     "forward_dynamics": lambda: (Q, at_rest(dyn.forward_dynamics(MODEL))),
-    "state_equation": lambda: (Q, rates(dyn.state_equation(MODEL))),
+    "state_equation": lambda: (Q, at_rest(dyn.state_equation(MODEL))),
     "as_system": lambda: (Q, at_rest(dyn.forward_dynamics(dyn.as_system(MODEL)))),
     "prune": lambda: (Q, at_rest(dyn.prune(MODEL, dyn.forward_dynamics, effects=["gravity"]).graph)),
     "with_controller": lambda: (

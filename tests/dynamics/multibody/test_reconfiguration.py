@@ -30,9 +30,7 @@ def arm(n: int, seed: int = 0) -> dyn.Mechanism:
 
 
 def torque(mechanism: dyn.Mechanism, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    graph = dyn.inverse_dynamics(mechanism)
-    values = dict(zip(graph.input_names, [*q, *qd, *qdd], strict=True))
-    return np.array(list(graph.evaluate(values).values()))
+    return dyn.arrays_at(mechanism, dyn.inverse_dynamics(mechanism), q, qd, qdd)["tau"]
 
 
 LOCKED: dict[str, tuple[float, ...]] = {
@@ -99,15 +97,23 @@ def test_a_subtree_can_hang_elsewhere() -> None:
 
 
 def test_forces_parameters_and_locks_go_with_their_bodies() -> None:
-    push = dyn.Force("link 3", ("push", 0.0, 0.0))
-    pull = dyn.Force("link 1", (0.0, "pull", 0.0))
-    links = arm(3)
-    whole = dyn.Mechanism(links.bodies, forces=[push, pull], parameters={"push": 2.0, "pull": 3.0}).lock("link 3", 0.1)
-    without = whole.detach("link 3")
-    assert (dict(without.parameters), without.forces, dict(without.locked)) == ({"pull": 3.0}, (pull,), {})
-    again = without.attach(whole.subtree("link 3"))
-    assert (dict(again.parameters), set(again.forces)) == ({"push": 2.0, "pull": 3.0}, {push, pull})
+    """Forces of every kind; that of a locked joint is none."""
+    push, servo = dyn.Force("link 3", ("push", 0.0, 0.0)), dyn.Actuator("link 3", "target", gain=(9.0, 0.0, 0.0))
+    between = dyn.Contact("link 1", "link 3", radius=0.1, to_radius=0.2, stiffness="k")
+    others = dyn.Force("link 1", (0.0, "pull", 0.0)), dyn.JointLimit("link 2", -1.0, 1.0, 1e3)
+    values = {"push": 2.0, "pull": 3.0, "target": 0.3, "k": 1e3}
+    whole = dyn.Mechanism(arm(3).bodies, forces=[push, servo, between, *others], parameters=values).lock("link 3", 0.1)
+    without, taken = whole.detach("link 3"), whole.subtree("link 3")
+    assert (dict(without.parameters), without.forces, dict(without.locked)) == ({"pull": 3.0}, others, {})
+    assert set(taken.forces) == {push, servo, between}
+    again = without.attach(taken)
+    assert (dict(again.parameters), set(again.forces)) == (values, {push, servo, between, *others})
     assert dict(again.locked) == {"link 3": 0.1}
+    bare = replace(
+        whole, forces=[push, between, *others], parameters={name: values[name] for name in ("push", "pull", "k")}
+    )
+    motion = np.full((3, 2), 0.2)
+    assert np.array_equal(torque(whole, *motion), torque(bare, *motion))
 
 
 def test_the_state_of_untouched_joints_carries_over() -> None:

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from cgraph import Graph
 from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.sweeps.equation_links import equation_links
 from tests.dynamics.mechanisms import (
     EVERY_KIND,
     FAMILIES,
-    Array,
     random_body,
     random_inertia,
     random_mechanism,
@@ -23,6 +21,7 @@ from tests.dynamics.mechanisms import (
     turned_arm,
     turned_tree,
 )
+from tests.dynamics.models import run as values
 from tests.dynamics.multibody.test_units import random_tree as units_tree
 from tests.dynamics.tree_in_digits import tree_in_digits
 from tests.each_row import each_row
@@ -33,12 +32,6 @@ OF_SIZES = {"mass": 2e-15, "bias": 4e-15, "torques": 4e-15, "by velocities": 4e-
 OF_SIZES |= {"body by body": 1e-14, "regrouped": 1e-13, "recursive": 3e-15, "dense": 6e-15, "auto": 6e-15}
 MASS, RECURSIVE, DENSE = 2e-15, 4e-15, 1e-14  # of the largest entry, which may be what is left of larger ones
 CANCELLED = 3e-14  # of the largest entry, over hundreds of trees
-
-
-def values(graph: Graph, at: dict[str, Array]) -> Array:
-    known = {f"{name}{i}": value for name, row in at.items() for i, value in enumerate(row.tolist())}
-    found = graph.evaluate({name: known[name] for name in graph.input_names})
-    return np.array([float(value) for value in found.values()])
 
 
 def errors(tree: dyn.Mechanism, seed: int, *of_all: str) -> tuple[dict[str, float], dict[str, float]]:

@@ -46,17 +46,16 @@ class Angles(SpatialJoint):
     coordinates = velocities = ("yaw", "pitch", "roll")
     units, velocity_units = ("rad",) * 3, ("rad/s",) * 3
     neutral, groups = (0.0,) * 3, (0, 1, 2)
-    hinges = (("revolute", Z), ("revolute", Y), ("revolute", X))  # the same, one after another
+    hinges = (Z, Y, X)  # the same, one after another
 
     def rotation(self, q: Nodes) -> list[list[cg.Node]]:
-        turns = [turn(axis, q[k]) for k, (kind, axis) in enumerate(self.hinges) if kind == "revolute"]
+        turns = [turn(axis, x) for axis, x in zip(self.hinges, q, strict=True)]
         return reduce(lambda a, b: [[spatial.dot(tuple(r), tuple(c)) for c in zip(*b, strict=True)] for r in a], turns)
 
     def velocity(self, q: Nodes, u: Nodes) -> Twist:
         omega = spatial.STILL
-        for k, (kind, axis) in enumerate(self.hinges):
-            if kind == "revolute":
-                omega = spatial.plus(spatial.rotate_transpose(turn(axis, q[k]), omega), along(axis, u[k]))
+        for axis, x, rate in zip(self.hinges, q, u, strict=True):
+            omega = spatial.plus(spatial.rotate_transpose(turn(axis, x), omega), along(axis, rate))
         return Twist(omega, spatial.STILL)
 
     def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
@@ -64,22 +63,6 @@ class Angles(SpatialJoint):
 
     def resists(self, mass: float, inertia: Array) -> bool:
         return mass > 0.0
-
-
-class Polar(Angles):
-    """Out along an arm that turns, and about that arm."""
-
-    kind = "polar"
-    coordinates = velocities = ("angle", "radius", "roll")
-    units, velocity_units = ("rad", "m", "rad"), ("rad/s", "m/s", "rad/s")
-    hinges = (("revolute", Z), ("prismatic", X), ("revolute", X))
-
-    def translation(self, q: Nodes) -> Triple:
-        return q[1] * cg.cos(q[0]), q[1] * cg.sin(q[0]), ZERO
-
-    def velocity(self, q: Nodes, u: Nodes) -> Twist:
-        moved = spatial.rotate_transpose(turn(X, q[2]), (u[1], q[1] * u[0], ZERO))
-        return super().velocity(q, u)._replace(linear=moved)
 
 
 class Still(Angles):
@@ -211,7 +194,7 @@ def test_a_type_is_judged_where_its_coordinates_are_defined_and_in_any_unit(radi
 
 @fixture(autouse=True)
 def own_types() -> Iterator[None]:
-    with registered(TYPES, **{joint.kind: joint for joint in (Angles(), Polar(), Still(), Constant())}):
+    with registered(TYPES, **{joint.kind: joint for joint in (Angles(), Still(), Constant())}):
         yield
 
 
@@ -227,9 +210,9 @@ def test_the_certificate_looks_at_bias_and_derivatives() -> None:
     """Of a type of joint that is wrong about itself, and was not refused, each finds its own."""
     said = {
         kind: {each.equation.partition(" ")[0] for each in certify(with_joint(kind), 2).residuals if not each.passed}
-        for kind in ("angles", "polar", "still", "constant")
+        for kind in ("angles", "still", "constant")
     }
-    assert said["angles"] == said["polar"] == set()
+    assert said["angles"] == set()
     assert "bias" in said["still"]
     assert said["constant"] == {"derivatives:"}
 

@@ -18,6 +18,7 @@ from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.multiprecision import Reference, ReferenceFailedError, reference
 from dynamics.systems.ode_system import OdeSystem
 from tests.bench.motions.trajectory_peers import heyoka_equations
+from tests.dynamics.simulation.test_quasi_velocities import drone
 from tests.dynamics.split_state import split_state
 from tests.each_row import each_row
 from tests.oracles import closed_forms
@@ -215,12 +216,7 @@ def test_a_free_rotor_is_jacobis_and_any_mechanism_of_spatial_joints_has_a_refer
     exact = closed_forms.free_rigid_body(TIMES, moments, omega)
     here = Reference(turning.t, tuple([row[4:] for row in turning.decimal]), turning.error, turning.how)
     assert np.abs(here.deviation(exact.x) - exact.deviation(exact.x)).max() < BOTH_20
-    arm = dyn.Joint("revolute", axis=[0.0, 1.0, 0.0], position=[0.3, 0.0, 0.0])
-    bodies = [
-        dyn.Body("base", dyn.Joint("free"), mass=2.0, center=[0.1, 0.0, 0.0], inertia=np.diag(moments)),
-        dyn.Body("arm", arm, "base", mass=0.5, center=[0.2, 0.0, 0.0], inertia=0.1 * np.eye(3)),
-    ]
     start = [0.0, 0.0, 1.0, 2.0, 0.2, 0.3, 0.1, 0.4], [0.5, 0.0, 2.0, 0.3, 0.2, 1.0, -2.0]
-    run = dyn.simulate(dyn.Mechanism(bodies), *start, 0.5, "gauss6", dt=0.005, estimate_error=False)
-    found = reference(dyn.Mechanism(bodies), *start, [0.5], digits=16)
+    run = dyn.simulate(drone(), *start, 0.5, "gauss6", dt=0.005, estimate_error=False)
+    found = reference(drone(), *start, [0.5], digits=16)
     assert found.relative_error([[*run.q[-1], *run.qd[-1]]]) < BOTH_14

@@ -75,20 +75,6 @@ def test_runs_of_random_systems_are_whole_or_heard(seed: int, method: str) -> No
     assert many.stats.success.tolist() == [run.success for run, _ in runs]
 
 
-def test_a_terminal_event_and_whoever_interrupts_a_run_end_it_in_silence() -> None:
-    end = dyn.Event("end", lambda q, qd, t: q[0] - 0.5, terminal=True)
-    assert dyn.simulate(falling(1.0), [1.0], [0.0], 2.0, events=end).status == 1
-    assert dyn.simulate_many(falling(1.0), [[1.0]], [0.0], 2.0, t_eval=[2.0], events=end).stats.status.tolist() == [1]
-
-    def interrupted(q: Any, qd: Any, t: float) -> list[float]:
-        if t > 0.25:
-            raise KeyboardInterrupt
-        return [0.0]
-
-    hold = dyn.SampledController(interrupted, period=0.1)
-    assert dyn.simulate(falling(1.0), [1.0], [0.0], 0.5, tau=hold).message.startswith("interrupted after t = ")
-
-
 @mark.parametrize("method", ["dop853", "dopri5"])
 def test_methods_for_stiff_systems_are_named_that_take_fewer_steps(method: str) -> None:
     relaxing = dyn.OdeSystem(lambda x, t: [-1e5 * (x[0] - cg.cos(t))], "x")

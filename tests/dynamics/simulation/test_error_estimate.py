@@ -187,11 +187,6 @@ def of(lagrangian: Any) -> dyn.System:
     return dyn.System(lagrangian, ["x"])
 
 
-def in_silence(*arguments: Any, **options: Any) -> dyn.Trajectory:
-    with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
-        return dyn.simulate(*arguments, **options)
-
-
 TURNS: list[Any] = [
     lambda t: cg.maximum(t - 0.6, 0.0),
     lambda t: cg.minimum(0.6, t),
@@ -216,11 +211,12 @@ def test_across_a_jump_or_a_kink_the_error_is_estimated(force: Any, method: str)
     assert 0.1 * error <= run.stats.error <= 20.0 * error + 1e-9
 
 
+@mark.filterwarnings("ignore::dynamics.SimulationWarning")
 @mark.parametrize(("dt", "aside"), [(0.1, 1e-10), *slow((0.05, 1e-8), (0.05, 1e-10), (0.1, 1e-8), (0.1, 1e-11))])
 def test_what_roundings_grow_to_near_a_separatrix_is_part_of_the_error(dt: float, aside: float) -> None:
     """A pendulum let go so near upright that roundings tell when it falls again: it is off by a turn."""
     pendulum = of(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.cos(q[0]))
-    run = in_silence(pendulum, [math.pi - aside], [0.0], 80.0, "gauss6", dt=dt)
+    run = dyn.simulate(pendulum, [math.pi - aside], [0.0], 80.0, "gauss6", dt=dt)
     assert run.stats.error > 0.1
     assert run.stats.warnings
 
@@ -270,17 +266,12 @@ def test_no_option_of_the_estimate_is_ignored(given: dict[str, Any], error: type
         dyn.simulate(spring(), [1.0], [0.0], 1.0, **given)
 
 
-@mark.parametrize(("method", "jacobians", "factors"), [("dop853", 0, 0), ("rodas", 1, 1), ("radau", 1, 2)])
+@mark.parametrize(("method", "jacobians", "factors"), [("dop853", 0, 0), ("rodas", 1, 1)])
 def test_jacobians_and_factorizations_are_counted(method: str, jacobians: int, factors: int) -> None:
     arm, start = random_arm(2), ([1.0, 0.2], [0.0, 0.0])
     run = dyn.simulate(arm, *start, 2.0, method, rtol=1e-6, atol=1e-6)
     trials = run.stats.steps + run.stats.rejected
-    if method == "radau":  # which keeps what serves the next step
-        assert 0 < run.njev < run.stats.steps
-        assert 0 < run.nlu < factors * trials
-        assert run.nlu % factors == 0
-    else:
-        assert (run.njev, run.nlu) == (jacobians * run.stats.steps, factors * trials)
+    assert (run.njev, run.nlu) == (jacobians * run.stats.steps, factors * trials)
     assert (run.nfev, run.status, run.success) == (run.stats.nfev, 0, True)
 
 

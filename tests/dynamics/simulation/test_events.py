@@ -173,5 +173,7 @@ def test_instants_do_not_depend_on_the_rows_the_engine_or_the_company_of_other_e
 
 
 def test_an_event_is_what_it_says() -> None:
+    with raises(ValueError, match="direction must be 1, -1 or 0, got 2"):
+        dyn.Event("e", lambda q, qd, t: q[0], direction=2)
     with raises(ValueError, match="event 'e': a run that ends there goes on from no reset state"):
         dyn.Event("e", lambda q, qd, t: q[0], terminal=True, reset=lambda q, qd, t: (q, qd))

@@ -7,7 +7,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from pytest import approx, mark
+from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
@@ -17,7 +17,6 @@ from dynamics.simulation.ensembles.task import FEW_TRAJECTORIES, VECTOR, fits_la
 from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
 from tests.dynamics.models import oscillator, random_arm
-from tests.dynamics.simulation.test_simulate import runaway
 from tests.early_end import stops
 from tests.slow import slow
 
@@ -141,32 +140,6 @@ def test_lanes_that_are_interrupted_go_on_with_the_same_bits() -> None:
     whole = simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0])
     with patch.multiple(task, PASSES=3, BLOCK_TIME=0.0):
         assert same(whole, simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0]))
-
-
-@stops
-@mark.parametrize("method", LANES)
-def test_one_that_fails_is_not_felt_and_says_what_it_says_alone(method: str) -> None:
-    """v' = v^2 leaves at t = 1 / v."""
-    model = runaway()
-    q, qd = starts(model, 5)
-    qd[:, 1] = -1.0
-    calm = simulate_many(model, q, qd, 2.0, method, t_eval=np.linspace(0.0, 2.0, 21))
-    wild = {4: 1.0, 9: 2.0, COUNT - 1: 3.0}
-    for k, v in wild.items():
-        qd[k, 1] = v
-    fan = simulate_many(model, q, qd, 2.0, method, t_eval=np.linspace(0.0, 2.0, 21))
-    others = [k for k in range(COUNT) if k not in wild]
-    assert fan.stats.success.tolist() == [k in others for k in range(COUNT)]
-    assert (fan.q[others] == calm.q[others]).all()
-    assert (fan.qd[others] == calm.qd[others]).all()
-    for k, v in wild.items():
-        one = dyn.simulate(model, q[k], qd[k], 2.0, method, t_eval=np.linspace(0.0, 2.0, 21))
-        stats, rows = fan.stats, int((fan.t <= one.t[-1]).sum())
-        found = (stats.message[k], stats.steps[k], stats.nfev[k], stats.status[k])
-        assert found == (one.stats.message, one.stats.steps, one.stats.nfev, -1)
-        assert np.array_equal(fan.q[k, :rows], one.q[:rows])
-        assert np.isnan(fan.q[k, rows:]).all()
-        assert one.t[-1] == approx(1.0 / v, rel=1e-6)
 
 
 def test_a_stiff_one_is_warned_of_as_alone() -> None:

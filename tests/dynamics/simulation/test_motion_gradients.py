@@ -3,6 +3,7 @@
 import math
 import tracemalloc
 import warnings
+from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
@@ -20,6 +21,7 @@ from dynamics.simulation.gradients.gradient import MotionGradient
 from dynamics.simulation.gradients.motion_programs import motion_equations
 from dynamics.simulation.gradients.rate_pullback import RatePullback, rate_pullback, sharing
 from tests.bench.speed.scenes import load
+from tests.dynamics.linkages import four_bar
 from tests.dynamics.mechanisms import random_mechanism
 from tests.dynamics.models import driven_pendulum, magnetic, random_arm, relativistic
 from tests.dynamics.parametrized import parametrized
@@ -166,23 +168,18 @@ def free_body() -> dyn.Mechanism:
     return dyn.Mechanism([base, arm], parameters={"m": 2.0})
 
 
-def four_bar() -> dyn.Mechanism:
-    def rod(name: str, parent: str, place: tuple[float, float, float], mass: Any) -> dyn.Body:
-        hinge = dyn.Joint("revolute", axis=(0.0, -1.0, 0.0), position=place)
-        return dyn.Body(name, hinge, parent, mass, (0.0, 0.0, -0.5), (0.1, 0.1, 0.1))
-
-    rods = [rod("a", "world", (0, 0, 0), "m"), rod("b", "a", (0, 0, -1), 1.0), rod("c", "world", (1.2, 0, 0), 1.0)]
-    hinge = dyn.Loop("hinge", "b", "c", at=(0, 0, -1.2), to_at=(0, 0, -1), axis=(0, 1, 0), to_axis=(0, 1, 0))
-    return dyn.Mechanism(rods, loops=[hinge], parameters={"m": 1.0})
+def linkage() -> dyn.Mechanism:
+    crank, *others = four_bar("hinge").bodies
+    return replace(four_bar("hinge"), bodies=[replace(crank, mass="m"), *others], parameters={"m": 1.0})
 
 
-@mark.parametrize("make", [free_body, four_bar])
+@mark.parametrize("make", [free_body, linkage])
 def test_quaternions_and_loops_by_displacements_and_through_projections(make: Any) -> None:
     model = make()
     rng = np.random.default_rng(1)
     nq, n = len(model.coordinates), len(model.velocities)
     if nq == n:
-        q, qd = nearest_state(model, [0.3, 0.8, 0.2], [0.1, 0.2, 0.3])
+        q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     else:
         q, qd = rng.normal(size=nq), rng.normal(size=n)
         q[3:7] /= np.linalg.norm(q[3:7])
@@ -304,7 +301,7 @@ def test_gradients_where_a_rate_or_its_slopes_do_not_depend_on_the_state(method:
     assert result["qd"] == approx(0.5 * result.q[::-1], rel=1e-12)
 
 
-@mark.parametrize("make", [free_body, four_bar])
+@mark.parametrize("make", [free_body, linkage])
 def test_what_parameters_alone_decide_is_in_no_step(make: Any) -> None:
     problem = derive(make(), {})
     equations = motion_equations(problem, problem.system.n)

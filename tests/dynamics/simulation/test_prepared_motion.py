@@ -1,7 +1,6 @@
 """A prepared motion: to the bit what `simulate` gives, its end alone, and its steps one by one; from threads, too."""
 
 import math
-import pickle
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -233,14 +232,6 @@ def test_ctrl_c_ends_a_long_run(method: str, ctrl_c: Any) -> None:
     np.testing.assert_array_equal(motion.end(*START, SPAN).q, end.q)  # the memory is as good as before
 
 
-def test_it_goes_to_other_processes() -> None:
-    motion = dyn.prepare(dyn.planar_arm([1.0], [1.0]))
-    end = motion.end([0.3], [0.0], 1.0)
-    np.testing.assert_array_equal(pickle.loads(pickle.dumps(motion)).end([0.3], [0.0], 1.0).q, end.q)
-    run = motion([0.3], [0.0], 1.0)
-    np.testing.assert_array_equal(pickle.loads(pickle.dumps(run)).energy, run.energy)
-
-
 @each_row(
     ("method", "given", "message"),
     [
@@ -287,7 +278,7 @@ def test_single_steps_are_of_plain_motions() -> None:
             dyn.prepare(ARM).start(*START).propagate_until(wrong)
 
 
-FIXED = {"method", "dt", "rtol", "max_steps", "max_step", "first_step", "events"}
+FIXED = {"method", "dt", "rtol", "max_steps", "max_step", "first_step"}
 SHORT = (1e-17, 1e-13)  # beside the span of a run, which is not known yet
 OWN: list[tuple[dict[str, Any], str]] = [
     ({"varied": ["unknown"]}, "varied: the system has no parameter 'unknown'; it has "),

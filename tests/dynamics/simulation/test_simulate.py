@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pytest import approx, mark, raises
 
+import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS, System
 from dynamics.integrators import derive
@@ -174,6 +175,14 @@ ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ),
     ({"max_step": 0.1}, r"'rk4' makes equal steps: .* dt, not by max_step \(got max_step = 0.1 s\)"),
     ({"method": "dopri5", "dt": None, "max_step": 0.0}, "max_step must be positive and finite, got 0.0 s"),
+    ({"method": "dopri5", "dt": None, "first_step": 0.0}, "first_step must be positive and finite, got 0.0 s"),
+    ({"rtol": 0.0, "atol": 0.0}, "not both 0"),
+    ({"rtol": 0.0, "atol": [1e-9, 0.0]}, "not both 0"),
+    ({"atol": [1e-9, -1.0]}, "rtol and atol must be finite"),
+    ({"atol": [1e-9] * 3}, r"shape \(2,\), one for each of q0, qd0; got \(3,\)"),
+    ({"events": [dyn.Event("e", lambda q, qd, t: 1.0)]}, "event 'e' must be a node of the state"),
+    ({"events": [dyn.Event("e", lambda q, qd, t: cg.variable("z"))]}, "event 'e' must be a node of the state"),
+    ({"events": [dyn.Event("e", lambda q, qd, t: q[0])] * 2}, "two events have the name 'e'"),
     ({"tau": [1.0, 2.0]}, "tau needs one number for each of .*: 1, got 2"),
     ({"tau": math.nan}, "tau must be finite, got nan for '"),
     ({"parameters": {"c": 1.0}}, r"the system has no parameter c \(it has m, k\)"),
