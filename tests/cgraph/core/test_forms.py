@@ -8,7 +8,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
+import networkx
 import pytest
 from hypothesis import given, settings
 
@@ -115,21 +115,6 @@ def test_to_networkx_has_nodes_and_edges_with_their_attributes():
     assert [value for _, value in found.nodes(data="value") if value is not None] == [0.5, 9.81, 1.0]
 
 
-@settings(max_examples=examples(50))
-@given(cases())
-def test_degrees_in_networkx_add_up_to_the_edges(case):
-    import networkx
-
-    found = cg.to_networkx(case.graph)
-    counts = case.graph.counts()
-    assert sum(degree for _, degree in found.in_degree()) == counts.edges
-    assert sum(degree for _, degree in found.out_degree()) == counts.edges
-    assert networkx.is_directed_acyclic_graph(found)
-    assert networkx.dag_longest_path_length(found) == counts.depth
-    in_degrees = dict(found.in_degree())
-    assert all(in_degrees[i] == node.op.arity for i, node in enumerate(case.graph.nodes))
-
-
 @settings(max_examples=examples(100))
 @given(cases())
 def test_counts_are_those_of_the_listing(case):
@@ -140,6 +125,7 @@ def test_counts_are_those_of_the_listing(case):
     assert operations == {name: n for name, n in counts.by_operation.items() if name not in leaves}
     assert counts.nodes == sum(counts.by_operation.values())
     assert counts.edges == sum(OPS[words[2]].arity for words in lines)
+    assert counts.depth == networkx.dag_longest_path_length(cg.to_networkx(case.graph))
 
 
 @settings(max_examples=examples(100))
@@ -153,8 +139,6 @@ def test_a_pickle_and_a_copy_are_the_same_graph(case):
             assert again.input_names == graph.input_names
     named = cg.Graph([x], {"f": cg.with_name(x + 1.0, "P")})
     assert pickle.loads(pickle.dumps(named)).listing() == named.listing()
-    again = pickle.loads(pickle.dumps(case.graph))
-    np.testing.assert_equal(again.evaluate(case.values), case.graph.evaluate(case.values))
 
 
 def test_a_node_alone_is_not_pickled():
