@@ -1,6 +1,7 @@
 """Pictures: SVG with a time limit from whichever Graphviz there is, PNG with its letters."""
 
 import io
+import math
 import stat
 import sys
 from collections.abc import Callable
@@ -57,30 +58,24 @@ def test_an_svg_is_one_element_of_a_drawing_or_of_its_source() -> None:
     assert f'font-family="{theme.FONT_FAMILIES}"' in svg  # what a browser without the font takes
 
 
-NAN = float("nan")
-WRONG: dict[str, tuple[Callable[[], object], type[Exception], str]] = {
-    "engine": (
-        lambda: render_svg("digraph {}", engine="magic"),
-        ValueError,
-        "engine must be one of dot, .* got 'magic'",
-    ),
-    **{
-        f"timeout {t}": (lambda t=t: render_svg("digraph {}", timeout=t), ValueError, "timeout must be positive")
-        for t in (0.0, -1.0, NAN)
-    },
-    **{
-        f"scale {k}": (lambda k=k: render_png("<svg/>", scale=k), ValueError, "scale must be positive and finite")
-        for k in (0.0, -1.0, float("inf"), NAN)
-    },
-    **{text: (lambda text=text: render_png(text), RenderError, "not an SVG picture") for text in ("", "hello", "<svg")},
-}
+NAN = math.nan
 
 
-@each_row("what", WRONG)
-def test_what_makes_no_sense_is_refused(what: str) -> None:
-    call, error, words = WRONG[what]
+@each_row(
+    ("draw", "given", "options", "error", "words"),
+    [
+        (render_svg, "digraph {}", {"engine": "magic"}, ValueError, "engine must be one of dot, .* got 'magic'"),
+        *[(render_svg, "digraph {}", {"timeout": t}, ValueError, "timeout must be positive") for t in (0, -1, NAN)],
+        *[(render_png, "<svg/>", {"scale": k}, ValueError, "scale must be positive and finite")
+          for k in (0, -1, math.inf, NAN)],
+        *[(render_png, text, {}, RenderError, "not an SVG picture") for text in ("", "hello", "<svg")],
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(
+    draw: Callable[..., object], given: str, options: dict[str, Any], error: type[Exception], words: str
+) -> None:
     with pytest.raises(error, match=words):
-        call()
+        draw(given, **options)
 
 
 @each_row("engine", ["dot", "sfdp", "neato"])
