@@ -125,7 +125,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("inspect spring_mass --out x.html --t-end 1e9", "--t-end must be at most 1000 s"),
         ("lint nowhere.py:system", "there is no file 'nowhere.py'"),
         (["simulate", "chain", "--start", "joint 11=1"], "there is no joint 11; did you mean"),
-        ("simulate chain --start q0", "there is no start 'q0'; a start is such as q0=0.5,qd0=1, or all numbers of q and"),
+        ("simulate chain --start q0", "there is no start 'q0'; a start is such as q0=0.5,qd0=1, or all numbers of"),
         ("simulate chain --every 1e-300 --csv a.csv", "--every 1e-300 makes "),
         ("simulate chain --every 0.1", "--every goes with --csv"),
         ("simulate chain --dt 0.1", "--dt goes with methods of equal steps, such as --method rk4; dop853 chooses"),
