@@ -1,12 +1,8 @@
 """What a graph looks like from outside: counts, edges, listing, networkx, copies and pickles."""
 
 import copy
-import os
 import pickle
-import subprocess
-import sys
 from collections import Counter
-from pathlib import Path
 
 import networkx
 import pytest
@@ -14,6 +10,7 @@ from hypothesis import given, settings
 
 import cgraph as cg
 from cgraph.operations.operation import OPS
+from tests.processes import printed_by
 from tests.strategies import cases, examples
 
 x, y = cg.variables("x y")
@@ -68,16 +65,10 @@ cli.main(["compare", "spring_mass", "--json"])
 
 def test_every_process_writes_the_same_texts():
     """Though Python's own hash of a string differs: listings, counts, hashes, drawings, comparisons and commands."""
-
-    def written(seed: str) -> str:
-        env = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(cg.__file__).parents[1])}
-        command = [sys.executable, "-c", IN_A_PROCESS]
-        return subprocess.run(command, env=env, capture_output=True, check=True, encoding="utf-8").stdout
-
-    first = written("1")
+    first, second = [printed_by(IN_A_PROCESS, PYTHONHASHSEED=seed) for seed in "12"]
     assert first.count("\n") > 300
     assert "\n10584127ca660b881fa3ec830c2e630f\n" in first  # whatever the machine
-    assert first.splitlines() == written("2").splitlines()
+    assert first.splitlines() == second.splitlines()
 
 
 def test_counts_read_as_text():
