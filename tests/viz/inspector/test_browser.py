@@ -162,6 +162,7 @@ def test_an_input_is_edited_once_for_all_versions_and_reset(show):
     assert page.inner_text("#results table") != before
     page.click("#reset")
     assert page.inner_text("#results table") == before
+    assert not page.locator("#reset").is_visible()
     assert page.evaluate("told.length") == 3
 
 
