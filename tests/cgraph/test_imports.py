@@ -1,8 +1,6 @@
 """What importing costs: a package loads NumPy and the standard library, a program what it uses."""
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -10,11 +8,12 @@ from types import ModuleType
 import cgraph as cg
 import dynamics as dyn
 import viz
+from tests.processes import printed_by
 from tests.sources import PACKAGES, ROOT
 
 PLAIN = {*sys.stdlib_module_names, "numpy"}
 LABORATORY = tuple([f"dynamics.{room}" for room in ("experiments", "verification", "multiprecision")])
-MOST = {"viz": 10, "equations": 107, "simulation": 200}  # {step: modules of ours that are loaded up to there, at most}
+MOST = {"viz": 10, "equations": 110, "simulation": 200}  # {step: modules of ours that are loaded up to there, at most}
 
 
 def loaded(program: str, folder: Path) -> dict[str, set[str]]:
@@ -26,12 +25,7 @@ def loaded(program: str, folder: Path) -> dict[str, set[str]]:
         f"{program}\n"
         "print(json.dumps(steps))"
     )
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    run = subprocess.run(
-        [sys.executable, "-c", text], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
-    assert run.returncode == 0, run.stderr
-    return {name: set(modules) for name, modules in json.loads(run.stdout).items()}
+    return {name: set(modules) for name, modules in json.loads(printed_by(text, folder=folder)).items()}
 
 
 def roots(modules: set[str]) -> set[str]:

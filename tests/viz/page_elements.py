@@ -1,6 +1,9 @@
 """The elements of a page, for tests of what a browser would read."""
 
+import json
+import re
 from html.parser import HTMLParser
+from typing import Any
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -31,3 +34,8 @@ class Elements(HTMLParser):
     def handle_data(self, data: str) -> None:
         if self.open:
             self.texts[self.open[-1]][-1] += data
+
+
+def data_of(page: str, name: str = "data") -> Any:
+    """The JSON of a page that its script reads."""
+    return json.loads(re.search(rf'<script id="{name}" type="application/json">(.*?)</script>', page, re.DOTALL)[1])

@@ -125,6 +125,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("inspect spring_mass --out x.html --t-end 1e9", "--t-end must be at most 1000 s"),
         ("lint nowhere.py:system", "there is no file 'nowhere.py'"),
         (["simulate", "chain", "--start", "joint 11=1"], "there is no joint 11; did you mean"),
+        ("simulate chain --start q0", "there is no start 'q0'; a start is such as q0=0.5,qd0=1, or all numbers of"),
         ("simulate chain --every 1e-300 --csv a.csv", "--every 1e-300 makes "),
         ("simulate chain --every 0.1", "--every goes with --csv"),
         ("simulate chain --dt 0.1", "--dt goes with methods of equal steps, such as --method rk4; dop853 chooses"),
@@ -146,6 +147,9 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("code spring_mass --c --out 2.c", "must be a letter"),
         ("code spring_mass --c --out sin.c", "sin.c names the function: the name of a C function must not be a word"),
         ("report --pruning", "--pruning needs a scene"),
+        ("report spring_mass --out a_file/new", "cannot write into the folder a_file/new: a_file is a file"),
+        ("report spring_mass --pruning --out a_file/new", "cannot write into the folder a_file/new"),
+        ("report --stability --out a_file/new", "cannot write into the folder a_file/new"),
         ("report chain --pruning --lock a=1 --lock a=2", "--lock takes each body once"),
     ],
 )
@@ -196,7 +200,6 @@ draw chain --out a.dot --forward --formulation kinetic_only"""
         ("simulate chain --tend 2", "simulate: error: unrecognized arguments: --tend 2; did you mean '--t-end'?"),
         ("draw chain --out=", "argument --out: expected the name of a file or folder, got ''"),
         ("simulate chain --csv=", "argument --csv: expected the name of a file or folder, got ''"),
-        ("simulate chain --start q0", "got 'q0'; a start is such as q0=0.5,qd0=1, or all numbers of q and qd"),
         ("report spring_mass --start a,b", "argument --start: expected a finite number, got 'a'"),
         ("report spring_mass --start 1,nan", "argument --start: expected a finite number, got 'nan'"),
         ("report spring_mass --pruning --lock tip=x", "argument --lock: expected a finite number, got 'x'"),
@@ -219,9 +222,6 @@ def test_wrong_usage_gets_the_usage_and_exit_status_2(capsys, arguments, said):
     assert said in error
 
 
-NAMES = [*COMMANDS]
-
-
 def test_every_command_is_in_the_help_and_has_help(capsys):
     taking = {
         name: action.help
@@ -234,12 +234,12 @@ def test_every_command_is_in_the_help_and_has_help(capsys):
     assert list(FORMULATIONS) == sorted(dyn.FORMULATIONS)
     assert FORMER_NAMES == lagrange_terms.FORMER_NAMES
     shown = {}
-    for arguments in ([], ["--help"], *([name, "--help"] for name in NAMES)):
+    for arguments in ([], ["--help"], *([name, "--help"] for name in COMMANDS)):
         with pytest.raises(SystemExit) as stop:
             cli.main(arguments)
         assert stop.value.code == 0
         shown[arguments[0] if arguments else ""] = capsys.readouterr().out
-    for name in NAMES:
+    for name in COMMANDS:
         assert all(re.search(rf"^    {name}\s", shown[page], re.MULTILINE) for page in ("", "--help")), name
         assert shown[name].startswith(f"usage: cgraph {name} ")
 
@@ -261,7 +261,7 @@ def test_a_command_is_loaded_alone(monkeypatch):
 def test_every_file_of_commands_is_listed_or_helps_one_that_is():
     files = {path.stem for path in Path(cli.__file__).parent.joinpath("commands").glob("*.py")}
     runs = {name for name in files - {"__init__"} if hasattr(import_module(f"viz.commands.{name}"), "add")}
-    assert runs == set(NAMES)
+    assert runs == set(COMMANDS)
 
 
 def test_the_version_is_one(capsys):
@@ -300,7 +300,7 @@ def test_bash_completes(capsys, line, expected):
 def test_every_command_and_option_is_in_the_completion(capsys, shell):
     assert cli.main(["completion", shell]) == 0
     script = capsys.readouterr().out
-    for word in (*NAMES, "--formulation", "--collapse", "chain_rule_literal", "triple_pendulum"):
+    for word in (*COMMANDS, "--formulation", "--collapse", "chain_rule_literal", "triple_pendulum"):
         assert word.removeprefix("--") in script
     if shutil.which(shell):
         subprocess.run([shell, "-n", "-c", script], check=True)
@@ -380,7 +380,8 @@ def test_a_place_that_cannot_be_written_is_told_before_the_work(here, capsys, ar
         ("graphviz", "viz", "draw spring_mass --out a.dot"),
         ("graphviz", "viz", "lint spring_mass --svg a.svg"),
         ("resvg_py", "viz", "draw spring_mass --out a.png"),
-        ("resvg_py", "viz", "paper"),
+        ("matplotlib.figure", "viz", "report spring_mass"),
+        ("matplotlib.figure", "viz", "animate spring_mass --out a.gif"),
         ("mpmath", "reference", "report --stability --json"),
         ("mujoco", "mujoco", "draw robot.xml --out a.svg"),
     ],

@@ -6,18 +6,15 @@ from hypothesis import given
 import cgraph as cg
 from cgraph.autodiff import compressed_jacobian as module
 from cgraph.extend import compressed_jacobian
+from tests.cgraph.engines import evaluated
 from tests.strategies import cases
 from tests.tolerances import LONG_SUM
 
 
-def values(graph, numbers):
-    return list(graph.evaluate(dict(zip(graph.input_names, numbers, strict=True))).values())
-
-
 def assembled(parts, point):
-    known = values(parts.primal, point)
-    sums = np.array([values(parts.product, [*known, float(color)]) for color in range(parts.colors)])
-    return np.array(values(parts.entries, sums.T.ravel().tolist()))
+    (known,) = evaluated(parts.primal, [point])
+    sums = evaluated(parts.product, [[*known, color] for color in range(parts.colors)])
+    return evaluated(parts.entries, [sums.T.ravel()])[0]
 
 
 @given(cases())
@@ -28,7 +25,7 @@ def test_the_parts_make_the_jacobian(case):
     finally:
         module.written_sizes = every
     point = list(case.values.values())
-    expected = np.array(values(cg.jacobian(case.graph), point))
+    (expected,) = evaluated(cg.jacobian(case.graph), [point])
     if parts.colors:
         size = np.abs(expected).max()
         np.testing.assert_allclose(assembled(parts, point), expected, rtol=LONG_SUM, atol=LONG_SUM * size)
@@ -44,5 +41,4 @@ def test_it_is_taken_where_it_is_smaller():
     assert parts.colors == 9
     assert len(parts.primal.nodes) + len(parts.product.nodes) < len(cg.jacobian(dense, x[:9]).nodes)
     point = np.linspace(0.1, 0.4, 12)
-    expected = values(cg.jacobian(dense, x[:9]), point)
-    np.testing.assert_allclose(assembled(parts, point), expected, rtol=LONG_SUM)
+    np.testing.assert_allclose([assembled(parts, point)], evaluated(cg.jacobian(dense, x[:9]), [point]), rtol=LONG_SUM)

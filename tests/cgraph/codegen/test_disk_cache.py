@@ -6,7 +6,6 @@ import pickle
 import stat
 import subprocess
 import sys
-import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -343,11 +342,3 @@ def test_clearing_removes_the_entries_and_nothing_else(tmp_path, monkeypatch):
     assert {path.name for path in place.iterdir()} == mine
     assert clear_cache(place) == 0
     assert clear_cache(tmp_path / "nothing here") == 0
-
-
-def test_the_choice_is_no_matter_without_machine_code(folder, without):
-    without("llvmlite")
-    with warnings.catch_warnings(action="error"):
-        function = cg.compile(graph(), cache=folder)
-    assert function(POINT).shape == (2,)
-    assert not folder.exists()

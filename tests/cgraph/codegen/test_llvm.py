@@ -217,9 +217,10 @@ def test_the_source_is_the_text_of_llvm():
     assert cg.compile(chain()).source == function.source
 
 
-def test_without_llvmlite_auto_is_generated_python(without):
+def test_without_llvmlite_auto_is_generated_python(without, tmp_path):
     without("llvmlite")
-    function = cg.compile(chain())
+    function = cg.compile(chain(), cache=tmp_path / "kept")
+    assert list(tmp_path.iterdir()) == []
     assert function.source == cg.compile(chain(), "python").source
     assert same(function([0.1, 0.2, 0.3]), evaluated(chain(), [[0.1, 0.2, 0.3]])[0])
     assert function.batch(np.ones((3, 4))).shape == (5, 4)

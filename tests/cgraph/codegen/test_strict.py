@@ -10,13 +10,11 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
-from tests.cgraph.engines import evaluated
+from tests.cgraph.engines import SPECIAL, evaluated
 from tests.strategies import cases
 from tests.ulps import same
 
 pytestmark = pytest.mark.optimized
-
-SPECIAL = (0.0, -0.0, 1.0, -1.5, 0.5, 5e-324, 1e300, 800.0, -800.0, math.inf, -math.inf, math.nan)
 
 
 def wrong(graph, backend, points):

@@ -1,19 +1,16 @@
 """What a graph looks like from outside: counts, edges, listing, networkx, copies and pickles."""
 
 import copy
-import os
 import pickle
-import subprocess
-import sys
 from collections import Counter
-from pathlib import Path
 
-import numpy as np
+import networkx
 import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
 from cgraph.operations.operation import OPS
+from tests.processes import printed_by
 from tests.strategies import cases, examples
 
 x, y = cg.variables("x y")
@@ -68,16 +65,10 @@ cli.main(["compare", "spring_mass", "--json"])
 
 def test_every_process_writes_the_same_texts():
     """Though Python's own hash of a string differs: listings, counts, hashes, drawings, comparisons and commands."""
-
-    def written(seed: str) -> str:
-        env = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(Path(cg.__file__).parents[1])}
-        command = [sys.executable, "-c", IN_A_PROCESS]
-        return subprocess.run(command, env=env, capture_output=True, check=True, encoding="utf-8").stdout
-
-    first = written("1")
+    first, second = [printed_by(IN_A_PROCESS, PYTHONHASHSEED=seed) for seed in "12"]
     assert first.count("\n") > 300
     assert "\n10584127ca660b881fa3ec830c2e630f\n" in first  # whatever the machine
-    assert first.splitlines() == written("2").splitlines()
+    assert first.splitlines() == second.splitlines()
 
 
 def test_counts_read_as_text():
@@ -115,21 +106,6 @@ def test_to_networkx_has_nodes_and_edges_with_their_attributes():
     assert [value for _, value in found.nodes(data="number") if value is not None] == [0.5, 9.81, 1.0]
 
 
-@settings(max_examples=examples(50))
-@given(cases())
-def test_degrees_in_networkx_add_up_to_the_edges(case):
-    import networkx
-
-    found = cg.to_networkx(case.graph)
-    counts = case.graph.counts()
-    assert sum(degree for _, degree in found.in_degree()) == counts.edges
-    assert sum(degree for _, degree in found.out_degree()) == counts.edges
-    assert networkx.is_directed_acyclic_graph(found)
-    assert networkx.dag_longest_path_length(found) == counts.depth
-    in_degrees = dict(found.in_degree())
-    assert all(in_degrees[i] == node.op.arity for i, node in enumerate(case.graph.nodes))
-
-
 @settings(max_examples=examples(100))
 @given(cases())
 def test_counts_are_those_of_the_listing(case):
@@ -140,6 +116,7 @@ def test_counts_are_those_of_the_listing(case):
     assert operations == {name: n for name, n in counts.by_operation.items() if name not in leaves}
     assert counts.nodes == sum(counts.by_operation.values())
     assert counts.edges == sum(OPS[words[2]].arity for words in lines)
+    assert counts.depth == networkx.dag_longest_path_length(cg.to_networkx(case.graph))
 
 
 @settings(max_examples=examples(100))
@@ -153,8 +130,6 @@ def test_a_pickle_and_a_copy_are_the_same_graph(case):
             assert again.input_names == graph.input_names
     named = cg.Graph([x], {"f": cg.with_name(x + 1.0, "P")})
     assert pickle.loads(pickle.dumps(named)).listing() == named.listing()
-    again = pickle.loads(pickle.dumps(case.graph))
-    np.testing.assert_equal(again.evaluate(case.values), case.graph.evaluate(case.values))
 
 
 def test_a_node_alone_is_not_pickled():

@@ -5,6 +5,7 @@ import inspect
 import math
 import pickle
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -98,7 +99,7 @@ def versin(factor: float) -> Op:
 
 
 def test_a_row_of_ones_own_can_be_replaced_and_earlier_graphs_keep_theirs() -> None:
-    try:
+    with patch.dict(OPS), patch.dict(ROWS):
         register(versin(1.0))
         x = cg.variable("x")
         graph, was = cg.Graph([x], {"y": cg.versin(x)}), 1.0 - math.cos(0.3)
@@ -117,21 +118,15 @@ def test_a_row_of_ones_own_can_be_replaced_and_earlier_graphs_keep_theirs() -> N
         both = cg.Graph([x], {"y": graph.outputs["y"] + again.outputs["y"]})
         with pytest.raises(cg.GraphError, match="two operations called 'versin'"):
             cg.compile(both, "python")
-    finally:
-        for table in (OPS, ROWS):
-            table.pop("versin", None)
 
 
 def test_instructions_that_llvm_does_not_know_are_told() -> None:
     pytest.importorskip("llvmlite")
-    try:
+    with patch.dict(OPS), patch.dict(ROWS):
         register(replace(versin(1.0), llvm=("{r} = sinus {t} {0}",)))
         x = cg.variable("x")
         with pytest.raises(ValueError, match=r"LLVM refuses instructions, .* error: .* = sinus double"):
             cg.compile(cg.Graph([x], {"y": cg.versin(x)}))([0.3])
-    finally:
-        for table in (OPS, ROWS):
-            table.pop("versin", None)
 
 
 def test_a_graph_is_not_read_without_the_row_of_its_operation(monkeypatch: pytest.MonkeyPatch) -> None:

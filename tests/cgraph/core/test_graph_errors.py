@@ -103,13 +103,6 @@ def test_an_output_may_be_a_number_or_an_input_or_shared():
     assert graph.evaluate({"x": 3.0}) == {"one": 1.0, "same": 3.0, "again": 3.0}
 
 
-def test_any_real_number_is_a_value_and_gives_a_float():
-    for value in (2, np.int8(2), np.float32(2), np.array(2.0), np.uint64(2)):
-        result = GRAPH.evaluate({"x": value, "y": 1})["f"]
-        assert result == 3.0
-        assert type(result) is float
-
-
 def test_arrays_broadcast_to_one_shape_and_to_float64():
     graph = cg.Graph([x, y], {"f": x + y, "x": x, "c": 2.0})
     result = graph.evaluate({"x": np.arange(3), "y": [[1], [2]]})

@@ -1,14 +1,12 @@
 """A row is all: an operation that is added as one row, in a fresh process, works in every part of the library."""
 
-import os
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
+from tests.processes import printed_by
+from tests.sources import ROOT
+
 PROGRAM = """
 import math, sys
 import numpy as np
@@ -32,21 +30,6 @@ TABLE = (
     "tests/viz/inspector/test_script.py",
     "tests/dynamics/multiprecision/test_taylor_series.py",
 )
-
-
-def printed_by(code: str, *arguments: str) -> str:
-    """What a program prints that a fresh process runs to its end."""
-    done = subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        cwd=ROOT,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=100,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout[-6000:] + done.stderr[-2000:]
-    return done.stdout
 
 
 def outcomes(*arguments: str) -> dict[str, list[str]]:

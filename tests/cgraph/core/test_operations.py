@@ -13,6 +13,7 @@ import cgraph as cg
 from cgraph.operations.operation import OPS, Op
 from tests import high_precision
 from tests.cgraph.engines import graph_of
+from tests.ulps import ulps_apart
 
 RELATIVE_ERROR = 1e-13  # of a derivative, relative to the larger of 1 and the size; a few dozen roundings
 ULPS = 4  # NumPy's own vector functions promise no more
@@ -89,15 +90,6 @@ def wrong_derivatives(op: Op, point: Sequence[float]) -> list[str]:
     ]
 
 
-def apart(found: float, expected: float, ulps: float = ULPS) -> bool:
-    """Whether two floats differ in kind (NaN, infinity), or by more than so many units in the last place."""
-    if math.isnan(found) or math.isnan(expected):
-        return math.isnan(found) != math.isnan(expected)
-    if math.isinf(found) or math.isinf(expected):
-        return found != expected
-    return abs(found - expected) > ulps * np.spacing(abs(expected))
-
-
 def samples_have_as_many_numbers_as_the_operation_has_arguments(op: Op) -> None:
     assert op.samples
     assert {len(sample) for sample in op.samples} == {op.arity} == {len(op.domain)}
@@ -113,7 +105,7 @@ def value_is_that_of_mpmath(op: Op) -> None:
     for point in points(op):
         (found,) = at(graph_of(op), *point)
         expected = float(high_precision.OPERATIONS[op.name](*map(mpf, point)))
-        assert not apart(found, expected, ulps=2), point
+        assert ulps_apart(found, expected) <= 2, point
 
 
 def derivatives_are_those_of_mpmath_in_every_mode(op: Op) -> None:
@@ -129,7 +121,7 @@ def arrays_have_the_values_of_floats(op: Op) -> None:
     assert together.shape == (len(rows),)
     assert together.dtype == np.float64
     for found, point in zip(together, rows, strict=True):
-        assert not apart(found, at(graph, *point)[0]), point
+        assert ulps_apart(found, at(graph, *point)) <= ULPS, point
 
 
 # IEEE specials: NumPy's functions by name, the reference that the table itself may not supply.
@@ -163,7 +155,7 @@ def specials(op: Op) -> list[tuple[float, ...]]:
 
 
 def same_special(op: Op, found: float, expected: float) -> bool:
-    if apart(found, expected):
+    if found != expected and ulps_apart(found, expected) > ULPS:
         return False
     signed = found == expected == 0.0 and op.name not in ZERO_SIGN_IS_OPEN
     return not signed or math.copysign(1.0, found) == math.copysign(1.0, expected)

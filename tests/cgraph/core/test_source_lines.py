@@ -75,13 +75,10 @@ def test_derived_merged_simplified_and_pickled_nodes_keep_the_lines():
 
 
 def test_recording_changes_no_graph():
-    def listing(record: bool) -> str:
-        if not record:
-            return dyn.inverse_dynamics(dyn.planar_arm([1.0] * 2, [1.0] * 2), "by_definition").listing()
-        with cg.recording_lines():
-            return dyn.inverse_dynamics(dyn.planar_arm([1.0] * 2, [1.0] * 2), "by_definition").listing()
-
-    assert listing(record=True) == listing(record=False)
+    arm = [1.0] * 2, [1.0] * 2
+    with cg.recording_lines():
+        recorded = dyn.inverse_dynamics(dyn.planar_arm(*arm), "by_definition").listing()
+    assert recorded == dyn.inverse_dynamics(dyn.planar_arm(*arm), "by_definition").listing()
 
 
 def test_a_model_of_the_library_has_the_line_that_asked_for_it():

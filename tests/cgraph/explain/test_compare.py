@@ -95,7 +95,6 @@ def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
 
 
 def test_a_variable_that_neither_graph_uses_is_an_atom_all_the_same() -> None:
-    x, y = cg.variable("x"), cg.variable("y")
     left, right = cg.Graph([x, y], {"f": cg.sin(y)}), cg.Graph([x, y], {"f": cg.cos(y)})
     found = cg.compare(left, right, atoms="x y")
     assert list(found.atoms.values()) == ["y"]

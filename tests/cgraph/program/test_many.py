@@ -155,15 +155,6 @@ def test_every_lane_has_pivots_of_its_own(backend: str, transposed: bool) -> Non
     assert rows[0, :, 0].tolist() == b[:, 0].tolist()
 
 
-def test_many_memories_of_a_program_with_a_loop(backend: str) -> None:
-    """From each value of a register of x and n, x halved n times."""
-    apart = Call(cg.Graph([X, N], {"x": X, "n": N}), ("both",), ("x", "n"))
-    values = np.stack([np.linspace(-1.0, 1.0, 37), np.arange(37) % 7.0], axis=1)
-    run = runner(Program({"both": 2, "x": 1, "n": 1}, [apart, While("n", (HALVE, LESS))], record=["x"]), backend)
-    rows = run.run(run.memory({"both": values.T}, 37), 1).rows[0, 0]
-    assert rows.tolist() == (values[:, 0] * 0.5 ** values[:, 1]).tolist()
-
-
 def test_what_runs_one_memory_at_a_time_is_told() -> None:
     for control in ({"stop": "n"}, {"record_if": "n"}):
         run = runner(Program({"n": 1}, [LESS], record=["n"], **control), "python")  # type: ignore[arg-type]

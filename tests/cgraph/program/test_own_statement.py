@@ -5,7 +5,7 @@ import re
 import pytest
 
 from cgraph.extend import STATEMENTS
-from tests.cgraph.core.test_one_row import printed_by
+from tests.processes import printed_by
 from tests.test_docs import PAGES, examples
 
 HERE = "tests/cgraph/program/own_statement_everywhere.py"

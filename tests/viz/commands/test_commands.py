@@ -282,31 +282,6 @@ def test_an_edge_that_is_wrong_by_itself_is_seen_by_every_command(own, said, fig
     assert "-dL/dq.y = 9.81 is missing." in Path(page).read_text(encoding="utf-8")
 
 
-OWN = """import cgraph as cg
-import dynamics as dyn
-
-def lagrangian(q, qd, t):
-    return 0.5 * qd[0] ** 2 + qd[1] ** 2 + cg.cos(q[0] - q[1]) + cg.cos(q[0])
-
-print("made")
-system = dyn.System(lagrangian, "hip knee")
-slow = dyn.OdeSystem(lambda x, t: [-x[0]], ["decay"])
-atwood = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 + p["w"] * q[0], ["x"], {"m": 1.5, "w": 9.81})
-ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["y"])
-free = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2, ["x"])
-planet = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 1.0 / q[0], "r phi")
-runaway = dyn.System(lambda q, qd, t: qd[0] ** 2 / 2 + q[0] ** 4, "x")
-belt = dyn.System(lambda q, qd, t: qd[0] ** 2 / 2, "x", forces=lambda q, qd, t: [-2.0 * cg.sign(qd[0] - 0.5)])
-late = dyn.Scene("late", "it ends at infinity", runaway, (1.0,), (0.0,), 9.0)
-"""
-
-
-@pytest.fixture
-def own(here):
-    Path("own.py").write_text(OWN)
-    return here
-
-
 @each_row(
     ("command", "word"),
     [

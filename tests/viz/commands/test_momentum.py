@@ -9,31 +9,7 @@ from tests.each_row import each_row
 from viz import cli, theme
 
 ROUNDING = 1e-12  # relative, for sums of a few hundred products
-OWN = """import cgraph as cg
-import dynamics as dyn
-
-planet = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 1.0 / q[0], "r phi")
-ring = dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2, "x y", constraints=lambda q, t: {"ring": q[0] * q[1] - 1.0})
-slow = dyn.OdeSystem(lambda x, t: [-x[0]], ["decay"])
-named = dyn.System(lambda q, qd, t, p: p["p0"] * qd[0] ** 2, ["x"], {"p0": 1.0})
-body = dyn.Body("box", dyn.Joint("free"), mass=1.0, inertia=(0.1, 0.2, 0.3), center=(0.1, 0.0, 0.0))
-free = dyn.Mechanism([body])
-away = dyn.System(lambda q, qd, t: qd[0] ** 2 + cg.log(q[0]) * qd[0] ** 2, "x")
-"""
-SCENES = ("spring_mass", "own.py:planet", "own.py:free")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    made = tmp_path_factory.mktemp("momentum")
-    (made / "own.py").write_text(OWN)
-    return made
-
-
-@pytest.fixture
-def own(folder, monkeypatch):
-    monkeypatch.chdir(folder)
-    return folder
+SCENES = ("spring_mass", "own.py:planet", "own.py:flying")
 
 
 def sizes(graph):

@@ -14,7 +14,7 @@ import viz
 from dynamics.equations.states.consistent_state import nearest_state
 from tests.each_row import each_row
 from tests.hostile_texts import HOSTILE, hostile_page
-from tests.viz.page_elements import Elements
+from tests.viz.page_elements import Elements, data_of
 from viz import cli
 from viz.inspector import Motion, Table, Version
 from viz.inspector.page import SCRIPTS
@@ -22,14 +22,7 @@ from viz.inspector.record import record
 from viz.models.inspection import FORMULATIONS, inspection
 from viz.pages.formulation_table import TITLES
 
-JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
-
 pytestmark = pytest.mark.usefixtures("without_graphviz")
-
-
-def data_of(text: str) -> dict:
-    """The JSON that the script of a page reads."""
-    return json.loads(re.search(r'<script id="data" type="application/json">(.*?)</script>', text, re.DOTALL)[1])
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""The views of one page in a browser: tabs, the address that says what is seen, robots of many limbs, the outline."""
+"""The views of one page in a browser: tabs, the address that says what is seen, robots of many limbs, formulas."""
 
 import re
 from itertools import groupby
@@ -237,3 +237,38 @@ def test_paper_has_the_inputs_in_a_line_and_the_wide_tables_whole(show):
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     page.emulate_media(media="screen")
     assert not page.locator("#printed").is_visible()
+
+
+def test_the_surplus_is_seen_of_a_wrong_version_alone_and_of_its_model(show):
+    """Among the formulas of the page."""
+    page = show()
+    formulas, short = page.locator("#formulas"), page.locator("#formulas summary math")
+    surplus = formulas.locator(".first")
+    assert short.is_visible()
+    assert short.text_content() == "τdef−τ=∂L∂q"
+    page.click("#formulas summary")
+    assert surplus.locator("mtable.aligned > mtr").count() == 3
+    wrong = page.evaluate("getComputedStyle(document.querySelector('#formulas .first math')).color")
+    page.keyboard.press("3")
+    assert not surplus.is_visible()
+    assert not short.is_visible()
+    titles = page.locator("#formulas h3:visible").all_inner_texts()
+    assert titles == ["Lagrangian", "Momenta, p = ∂L/∂q̇", "Torque by matrices", "Spurious term, kinetic only"]
+    assert wrong != page.evaluate(
+        "getComputedStyle(document.querySelector('#formulas .equations:not(.spurious) math')).color"
+    )
+    assert "Indices: 1 is joint 1, 2 is joint 2, 3 is joint 3." in formulas.inner_text()
+    page.click("#opentyped")
+    page.fill("#text", "L = 1/2*x'^2 - 1/2*x^2, x(0) = 1")
+    page.locator("#text").press("Control+Enter")
+    assert not formulas.is_visible()  # the typed one has its own
+    page.click("#back-to")
+    assert formulas.is_visible()
+
+
+def test_formulas_scroll_in_their_box_on_a_phone(show):
+    page = show(width=390, height=844)
+    page.evaluate("document.querySelector('#formulas details').open = true")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")
+    boxes = page.locator("#formulas .scroll")
+    assert boxes.count() == boxes.evaluate_all("all => all.filter((each) => each.tabIndex === 0).length")

@@ -17,7 +17,7 @@ from dynamics.scenes.scenes import of_model
 from tests.each_row import each_row
 from tests.tolerances import EQUATIONS
 from tests.viz.lessons.systems import SYSTEMS, block
-from tests.viz.page_elements import Elements
+from tests.viz.page_elements import Elements, data_of
 from viz import cli
 from viz.lessons import lesson as module
 from viz.lessons.screen import Screen
@@ -87,9 +87,8 @@ def test_the_pictures_of_a_key_have_the_marks():
 
 def test_the_guesses_are_scored_by_the_marked_answers():
     text = made("block")
-    data = json.loads(re.findall(r'<script id="data" type="application/json">(.*?)</script>', text, re.DOTALL)[0])
     listed = re.findall(r'<p class="answer"><b>([A-F])\.</b>', text)
-    assert ["ABCDEF".index(letter) for letter in listed] == data["answers"]
+    assert ["ABCDEF".index(letter) for letter in listed] == data_of(text)["answers"]
 
 
 @each_row("name", SYSTEMS)

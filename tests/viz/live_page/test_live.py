@@ -18,6 +18,7 @@ from dynamics.integrators import TABLEAUS
 from dynamics.scenes.scenes import of_model
 from tests.each_row import each_row
 from tests.registered import registered
+from tests.viz.page_elements import data_of
 from viz.lessons.screens.energy_and_step import energy_and_step
 from viz.lessons.subject import subject_of
 from viz.live_page import Live, page_text
@@ -296,8 +297,7 @@ def test_names_stay_texts():
     live = Live(rate, {"x": 1.0, "v": 0.0}, energies, meters, dt=0.1, methods=TABLEAUS, names={"x": HOSTILE})
     page = page_text(live, title=HOSTILE, about=HOSTILE)
     assert page.count("<script") == 2
-    data = json.loads(re.search(r'<script id="live-data" type="application/json">(.*?)</script>', page, re.DOTALL)[1])
-    assert data["inputs"][0]["called"] == HOSTILE
+    assert data_of(page, "live-data")["inputs"][0]["called"] == HOSTILE
     assert page._repr_html_().count('"') == 8
 
 

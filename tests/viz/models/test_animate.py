@@ -18,7 +18,6 @@ Image = pytest.importorskip("PIL.Image")
 ARM = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
 FALL = dyn.simulate(ARM, [1.0, 0.2], [0.0, 0.0], t_end=0.08)
 SYSTEM = dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2 - q[0] ** 2 - q[0] * q[1], "x y")
-ONE = dyn.planar_arm([1.0], [1.0])
 SWING = dyn.simulate(SYSTEM, [1.0, 0.2], [0.0, 0.0], t_end=0.08)
 
 
@@ -131,10 +130,3 @@ def test_a_notebook_plays_it():
 def test_what_cannot_be_shown_is_told(arguments, named, message):
     with pytest.raises(ValueError, match=message):
         viz.animate(*arguments, **named)
-
-
-def test_a_missing_package_is_told(without, tmp_path):
-    without("matplotlib.figure")
-    with pytest.raises(ImportError, match=r"plots need matplotlib: .*viz"):
-        viz.animate(ARM, FALL, tmp_path / "a.gif")
-    assert not [*tmp_path.iterdir()]

@@ -73,14 +73,12 @@ def rod():
 
 
 def spatial_arm(n):
-    axes = [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)]
-    bodies, parent = [], "world"
-    for i in range(n):
-        joint = dyn.Joint("revolute", axis=axes[i % 3], position=(0.0, 0.0, 0.3 * (i > 0)), name=f"joint{i + 1}")
-        center, inertia = (0.01 * i, 0.02, 0.15), (0.02, 0.03, 0.01)
-        bodies.append(dyn.Body(f"link {i + 1}", joint, parent=parent, mass=1.0 + i, center=center, inertia=inertia))
-        parent = f"link {i + 1}"
-    return dyn.Mechanism(bodies)
+    links = [
+        {"joint": dyn.Joint("revolute", axis=np.eye(3)[2 - i % 3], position=(0.0, 0.0, 0.3 * (i > 0))),
+         "mass": 1.0 + i, "center": (0.01 * i, 0.02, 0.15), "inertia": (0.02, 0.03, 0.01)}
+        for i in range(n)
+    ]  # fmt: skip
+    return dyn.serial_arm(links)
 
 
 def floating():

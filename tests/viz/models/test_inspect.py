@@ -1,6 +1,5 @@
 """The page of a model in one line of Python."""
 
-import json
 import re
 
 import pytest
@@ -9,6 +8,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from tests.each_row import each_row
+from tests.viz.page_elements import data_of
 from viz.pages.html import Page
 
 
@@ -32,10 +32,7 @@ def test_a_model_has_its_page_from_a_start_that_shows_something(tmp_path):
 
 def test_the_page_of_momenta_has_both_forms_their_rows_and_a_machine_of_momenta():
     page = viz.inspect(dyn.planar_arm([1.0, 0.8], [1.0, 0.7]), momentum=True, t_end=0.1)
-    data, live = (
-        json.loads(re.search(rf'id="{name}" type="application/json">(.*?)</script>', page)[1])
-        for name in ("data", "live-data")
-    )
+    data, live = data_of(page), data_of(page, "live-data")
     versions = [version for version in data["versions"] if version["group"] == "momentum"]
     assert [version["name"] for version in versions] == ["Hamilton's equations", "state equation"]
     assert data["view"] == "Hamilton's equations"

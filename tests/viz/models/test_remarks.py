@@ -1,13 +1,11 @@
 """Where a model has loops, the page and the commands say that inverse dynamics is that of its tree."""
 
 import json
-import re
 
 import pytest
 
 import dynamics as dyn
-from dynamics.equations.states.consistent_state import nearest_state
-from tests.dynamics.linkages import four_bar
+from tests.viz.page_elements import data_of
 from viz import cli
 from viz.models.inspection import inspection
 from viz.models.inspection_page import inspection_page
@@ -30,8 +28,7 @@ def test_a_tree_needs_no_word():
 def test_the_page_and_the_commands_say_so(tmp_path, capsys):
     path = tmp_path / "model.py"
     path.write_text(SCENE)
-    q, qd = nearest_state(four_bar(), [0.9, 0.3, 1.4], [1.0, 0.0, 0.0])
-    scene = dyn.scenes.Scene("linkage", "", four_bar(), tuple(q), tuple(qd), 0.1)
+    scene = dyn.scenes.load(f"{path}:linkage")
     said = tree_alone(scene)
     assert "the loop coupler to rocker:" in said
     for command, *arguments in (["lint"], ["why", "tau2", "q1", "--json"]):
@@ -39,7 +36,7 @@ def test_the_page_and_the_commands_say_so(tmp_path, capsys):
         out = capsys.readouterr().out
         assert json.loads(out)["of_the_tree"] if "--json" in arguments else said in out
     page = inspection_page(scene, inspection(scene))
-    notices = json.loads(re.search(r'id="data" type="application/json">(.*?)</script>', page)[1])["notices"]
+    notices = data_of(page)["notices"]
     assert said in notices
     assert any("No equations in momenta: " in each for each in notices)
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -144,34 +143,3 @@ def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytes
     assert cli.main([*MEASURED, "--out", str(tmp_path / "r")]) == 130
     left = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert left == []
-
-
-@pytest.mark.parametrize("arguments", [["spring_mass"], ["spring_mass", "--pruning"], ["--stability"]])
-def test_a_folder_that_cannot_be_filled_is_found_before_the_work(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str]
-) -> None:
-    worked = []
-    experiments = "dynamics.experiments"
-    for name in (
-        f"{experiments}.work_precision.work_precision.work_precision",
-        f"{experiments}.stability.stability.run",
-        "viz.commands.report.pruning_content",
-    ):
-        monkeypatch.setattr(name, lambda *_, **__: worked.append("worked"))
-    (tmp_path / "file").write_text("in the way")
-    assert cli.main(["report", *arguments, "--out", str(tmp_path / "file" / "new")]) == 2
-    error = capsys.readouterr().err
-    assert f"cannot write into the folder {tmp_path / 'file' / 'new'}: {tmp_path / 'file'} is a file" in error
-    assert "Errno" not in error
-    assert not worked
-
-
-def test_without_matplotlib_no_report_is_begun(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], without: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    without("matplotlib.figure")
-    monkeypatch.setattr(
-        "dynamics.experiments.work_precision.work_precision.work_precision", lambda *_, **__: pytest.fail("begun")
-    )
-    assert cli.main(["report", "spring_mass", "--out", str(tmp_path / "r")]) == 2
-    assert "plots need matplotlib" in capsys.readouterr().err

@@ -12,7 +12,7 @@ import pytest
 
 import dynamics as dyn
 from cgraph._shared import write_files
-from tests.viz.page_elements import Elements
+from tests.viz.page_elements import Elements, data_of
 from viz import theme
 from viz.graph_drawing.render import RenderError
 from viz.paper import paper as module
@@ -155,8 +155,7 @@ def test_the_figures_show_the_letters_of_the_papers_captions(paper):
 def test_the_moving_fall_is_the_paper_s_and_by_definition_the_arm_weighs_nothing(paper):
     folder, _, _ = paper
     text = (folder / "index.html").read_text()
-    (motion,) = re.findall(r'<script id="motion" type="application/json">(.*?)</script>', text)
-    moved = json.loads(motion)
+    moved = data_of(text, "motion")
     assert moved["dt"] == pytest.approx(0.02)
     assert len(moved["ours"]) == len(moved["theirs"]) == 151
     assert np.allclose(moved["ours"], moved["theirs"], rtol=0.0, atol=1e-4)  # of pictures: rounded to 0.1 mm

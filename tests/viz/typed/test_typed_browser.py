@@ -54,6 +54,7 @@ def test_torques_are_those_of_python(show):
     arm = dyn.planar_arm([1.0, 0.7], [0.9, 0.6])
     page = show(viz.inspect(dyn.scenes.load("spring_mass"), t_end=0.1))
     assert page.locator("#typed").is_hidden()
+    assert "L = " in page.input_value("#text")  # that of the page
     page.click("#opentyped")
     typed(page, viz.typed_text(arm))
     at = {"q0": 0.4, "q1": -1.1, "qd0": 0.7, "qd1": 1.9, "qdd0": -2.0, "qdd1": 0.6}
@@ -65,11 +66,12 @@ def test_torques_are_those_of_python(show):
     page.click("#back-to")
     assert live.count() == 1
     assert page.evaluate("inspector.record().called[0][1]") == "q.theta"
+    assert "text=" not in page.url
 
 
 def test_nonsense_gets_one_sentence_and_the_page_stays(show):
     page = show()
-    before = page.evaluate("inspector.record().versions[0].nodes.length")
+    url, before = page.url, page.evaluate("inspector.record().versions[0].nodes.length")
     for text, words in (("L = m m", "Between “m” and “m”"), (HOSTILE, "not understood"), (f"L = {HOSTILE}", "“<”")):
         typed(page, text)
         sentence = page.locator("#wrong p").inner_text()
@@ -79,20 +81,26 @@ def test_nonsense_gets_one_sentence_and_the_page_stays(show):
         assert page.locator("#wrong pre").inner_text().strip() in text
         assert page.locator("#text").get_attribute("aria-invalid") == "true"
         assert page.evaluate("inspector.record().versions[0].nodes.length") == before
+        assert page.url == url
     assert page.locator("body script:not([type]) ~ script, img").count() == 0
 
 
 def test_a_link_holds_the_text(show):
     text = "# 50 % &amp; <b>θ̇</b>\nL = θ̇² + cos(θ)\nθ(0) = 1"
     page = show()
+    first = page.evaluate("inspector.record().called")
     typed(page, text)
     link = page.url
-    again = show(fragment=link[link.index("#") :])
+    again = show(viz.inspect(dyn.scenes.load("spring_mass"), t_end=0.1), link[link.index("#") :])
+    assert again.locator("#typed").is_visible()
     assert again.input_value("#text") == text
     assert again.evaluate("inspector.record().called[0][1]") == "q.θ"
     again.evaluate("location.hash = '#text=L%3Dx%27%5E2&dt=3'")
     again.wait_for_function("document.getElementById('text').value === \"L=x'^2\"")
     assert again.url.endswith("&dt=3")  # what other scripts keep there stays
+    again.evaluate("location.hash = '#text=%'")
+    again.wait_for_function("document.getElementById('text').value === '%'")
+    assert show(fragment="#text=L%3D").evaluate("inspector.record().called") == first  # nothing is to be seen of it
 
 
 def test_the_keyboard_is_enough(show):

@@ -15,7 +15,6 @@ damping = 0.1
 theta(0) = 1.2
 x1 = l*sin(theta), y1 = -l*cos(theta)
 """
-COUNTS = "(text) => { const { nodes, edges } = formulation(parsed(text), 'by_definition'); return [nodes, edges]; }"
 
 
 @each_row(
