@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -72,8 +73,7 @@ class Modes:
         self.turns = list[Turn]()
         self.failed = ""
         self._spacing = np.array(self._switches.spacing)
-        self._signs = frozenset(np.flatnonzero(self._switches.signs).tolist())
-        self._among = self._signs
+        self._among = frozenset(np.flatnonzero(self._switches.signs).tolist())
         self.sizes = np.zeros(problem.size)
         self._fresh = self._left = np.full(len(self.values), np.nan)
         self._at = (np.nan, 0)  # the instant of the last turn, and how many there were at it
@@ -238,23 +238,19 @@ class Modes:
         return self._switches.words
 
 
+@dataclass(eq=False)
 class _Choice:
     """The choice of sides of surfaces `among` all, (n,), each at middle -+ half, or sliding at middle."""
 
-    def __init__(
-        self,
-        of: Modes,
-        t: float,
-        x: Array,
-        p: Sequence[float],
-        among: Indices,
-        middle: Array,
-        half: Array,
-        crossed: Array,
-    ) -> None:
-        self._of, self._t, self._x, self._p = of, t, x, p
-        self._among, self._middle, self._half, self._crossed = among, middle, half, crossed
-        self._known: dict[tuple[int, ...], tuple[Array, Array]] = {}  # by order, and sides
+    _of: Modes
+    _t: float
+    _x: Array
+    _p: Sequence[float]
+    _among: Indices
+    _middle: Array
+    _half: Array
+    _crossed: Array
+    _known: dict[tuple[int, ...], tuple[Array, Array]] = field(default_factory=dict)  # by order, and sides
 
     def found(self) -> Array | None:
         """Modes that hold; None if none do."""
@@ -278,11 +274,6 @@ class _Choice:
     def _modes(self, sides: Sequence[int]) -> Array:
         return np.asarray(self._middle + self._half * np.array(sides))
 
-    def _modes_at(self, sides: Sequence[int]) -> Array:
-        modes = self._of.values.copy()
-        modes[self._among] = self._modes(sides)
-        return modes
-
     def _derivatives(self, order: int, sides: Sequence[int]) -> tuple[Array, Array]:
         """Derivatives of the gaps by time with these sides, none of which is 0, and what of it is rounding, (n,) each.
 
@@ -290,15 +281,17 @@ class _Choice:
         """
         key = order, *sides
         if key not in self._known:
-            t, x, sizes = self._t, self._x, self._of.sizes
-            fixed = np.array([*self._p, *self._modes_at(sides)])
+            t, x, sizes, modes = self._t, self._x, self._of.sizes, self._of.values.copy()
+            modes[self._among] = self._modes(sides)
+            fixed = np.array([*self._p, *modes])
             if order == LATER:
                 rate = outputs_of(self._of.plain.rate, np.concatenate([x, [t], fixed])[:, None])[: len(x), 0]
                 moves = (sizes > 0.0) & (rate != 0.0)
                 if moves.any():
                     after = self._of.direction * AHEAD * float(np.median(sizes[moves] / np.abs(rate[moves])))
                     x, t = x + after * rate, t + after
-            ways = np.array([[0.0] * len(x), *_signs(len(x))]).T
+            m = len(x)  # of a state, its components to both sides and in turn
+            ways = np.array([[0.0] * m, [1.0] * m, [1.0 if k % 2 else -1.0 for k in range(m)]]).T
             states = x[:, None] + AT_ONCE * sizes[:, None] * ways
             fixed = np.concatenate([[t], fixed])[:, None]
             points = np.concatenate([states, np.broadcast_to(fixed, (len(fixed), ways.shape[1]))])
@@ -371,11 +364,6 @@ def _points(t: float, x: Array, p: Sequence[float], modes: Array) -> Array:
     """Inputs (.., N) of a graph at modes (k, N)."""
     fixed = np.concatenate([x, [t], p])[:, None]
     return np.concatenate([np.broadcast_to(fixed, (len(fixed), modes.shape[1])), modes])
-
-
-def _signs(m: int) -> list[list[float]]:
-    """Two patterns of signs."""
-    return [[1.0] * m, [1.0 if k % 2 else -1.0 for k in range(m)]]
 
 
 def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Graph, ...]:
