@@ -28,6 +28,7 @@ from .momentum_parts import momentum_parts, of_momenta
 # Nodes; beyond, slopes along directions are made in a fraction of the time, and soon are as fast.
 WRITTEN_OUT = 20_000
 FORWARD_SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
+_slopes = kept_by_first(cg.jvp)
 
 
 @Equation("q qd tau", Output("A_{}_{}", ("2n", "2n")), Output("B_{}_{}", ("2n", "n"))).describes
@@ -224,12 +225,6 @@ def linearize(
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         _raise_what_is_not_finite(system, state, t, parameters)
     return a, b
-
-
-@kept_by_first
-def _slopes(graph: Graph, wrt: Sequence[Node]) -> Graph:
-    """The graph's change along directions."""
-    return cg.jvp(graph, wrt)
 
 
 def _raise_what_is_not_finite(

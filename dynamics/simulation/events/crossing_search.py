@@ -109,10 +109,7 @@ class Quantities:
         return list(self.values.input_names[self.size + 1 :])
 
 
-@kept_by_first
-def quantities(graph: Graph, m: int, resolved: int = 0) -> Quantities:
-    """The quantities of a graph over m states, t and parameters."""
-    return Quantities(graph, m, resolved)
+quantities = kept_by_first(Quantities)
 
 
 class _Batch:

@@ -14,14 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Array, Tape, kept_by_first, run_passes
+from cgraph._shared import Array, Tape, run_passes
 from cgraph.extend import Runner
 
 from ..outcome import MotionError
 from ..stepper import nonfinite, unsolved
-from ..steps.row_values import values_of
+from ..steps.row_values import tangent, values_of
 from .motion_programs import LOSS, motion_programs, pullback
 from .motions import TORQUE, Arrival, Motions, Stretch
 
@@ -282,7 +281,7 @@ class DifferentiatedRun:
             points = [*x.T[:, :, None], t[:, None], *motions.inputs[:, :, None]]
             moving = [*points, *x_dot.swapaxes(0, 1), t_dot, *dots[m + 1 :]]
             x = values_of(end_graph, points, len(t), 1)[:, :, 0].T
-            x_dot = values_of(_tangent(end_graph), moving, *t_dot.shape).swapaxes(0, 1)
+            x_dot = values_of(tangent(end_graph), moving, *t_dot.shape).swapaxes(0, 1)
         return t, x, t_dot, x_dot
 
     def _along(self, segment: Segment, dots: Array, lengths: Array) -> tuple[Array, Array]:
@@ -327,7 +326,7 @@ class DifferentiatedRun:
 
     def _tangents_at(self, motions: Motions, graph: Graph, x: Array, t: float, dots: Array) -> Array:
         """Tangents (m + 1 + .., k) of the state that a graph makes of x, t and inputs, and of t and inputs."""
-        moved = values_of(_tangent(graph), [*motions.point(x, t), *dots], dots.shape[1])
+        moved = values_of(tangent(graph), [*motions.point(x, t), *dots], dots.shape[1])
         return np.concatenate([moved, dots[len(x) :]])
 
     def _state(self, motions: Motions, graph: Graph | None, x: Array, t: float) -> Array:
@@ -346,11 +345,6 @@ def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
         found[:, :, [k]] = run_passes(ready, memory, len(feed), 1, feed)
         memories[:, [k]] = memory
     return found
-
-
-@kept_by_first
-def _tangent(graph: Graph) -> Graph:
-    return cg.jvp(graph)
 
 
 def _outputs(graph: Graph, points: Array) -> Array:
