@@ -187,18 +187,11 @@ class Modes:
         zero = (np.abs(gaps - np.where(floors & slid, 0.5, 0.0)) <= allowed) | upper_end | crossed | slid
         self._fresh = np.where(zero, allowed, np.nan)
         if zero.any():
-            among = np.flatnonzero(zero)
-            half = 0.5 * self._spacing[among]
-            middle = np.where(
-                slid[among],
-                self.values[among],
-                self.values[among] - half * np.where(floors[among], 1.0, self.values[among]),
-            )
-            middle = np.where(upper_end[among], self.values[among] + half, middle)
+            among, half = np.flatnonzero(zero), 0.5 * self._spacing
+            middle = np.where(slid, self.values, self.values - half * np.where(floors, 1.0, self.values))
             # a floor that has turned down is at the upper end of its side
-            down = floors[among] & crossed[among] & (gaps[among] > 0.5)
-            middle = np.where(down, self.values[among] + half, middle)
-            found = _Choice(self, t, x, p, among, middle, half, crossed[among]).found()
+            middle = np.where(upper_end | (floors & crossed & (gaps > 0.5)), self.values + half, middle)
+            found = _Choice(self, t, x, p, among, middle[among], half[among], crossed[among]).found()
             if found is None:
                 names = ", ".join([repr(word) for word in dict.fromkeys([self.words[k] for k in among])])
                 self.failed = f"stopped at t = {t:.6g} s: no sides of the surfaces there let the motion go on: {names}"
@@ -212,6 +205,11 @@ class Modes:
     def problem_in(self, modes: Sequence[float]) -> Problem:
         """The problem that holds in some modes."""
         return sliding(self.plain, self._among) if self._slid(modes).any() else self.plain
+
+    def rate(self, modes: Sequence[float]) -> Graph:
+        """The rate in some modes, over all inputs."""
+        rate, known = self.problem_in(modes).rate, dict(zip(self._switches.modes, modes, strict=True))
+        return Graph(rate.inputs, cg.specialize(rate, known).outputs)
 
     def margin(self, turn: Turn, number: int) -> Graph:
         """One of the margins of the problem that holds from a turn on."""
@@ -259,14 +257,12 @@ class _Choice:
         if n > FEW:
             return self._pivoted(wanted)
         options = [[want, -want, 0] if want else [0, 1, -1] for want in wanted]
-        combinations = sorted(
-            itertools.product(*options),
-            key=lambda each: (
-                sum([side == 0 and want != 0 for side, want in zip(each, wanted, strict=True)]),
-                sum([side != want for side, want in zip(each, wanted, strict=True)]),
-            ),
-        )
-        for each in combinations:
+
+        def changed(sides: Sequence[int]) -> tuple[int, int]:
+            others = [side for side, want in zip(sides, wanted, strict=True) if side != want]
+            return others.count(0), len(others)
+
+        for each in sorted(itertools.product(*options), key=changed):
             if not self._wrong(each):
                 return self._modes(each)
         return None
@@ -385,7 +381,7 @@ def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Grap
         following[k] = after.modes[k]
         alone = [*before.modes]
         alone[k] = after.modes[k]
-        rates = [_rate(modes, each) for each in (before.modes, between, alone, following)]
+        rates = [modes.rate(each) for each in (before.modes, between, alone, following)]
         f, f_between, f_alone, _ = [values_of(rate, point, 1)[:, 0] for rate in rates]
         if not (_moves_alike(margin, point, f, f_between) and _moves_alike(own, point, f, f_alone)):
             names = " and ".join([repr(modes.words[j]) for j in (first[0], k)])
@@ -394,16 +390,6 @@ def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Grap
         result.append(_later(modes.plain, margin, rates[1], rates[3], before.modes))
         between = following
     return tuple(result)
-
-
-def _rate(modes: Modes, values: Sequence[float]) -> Graph:
-    """The rate in these modes, over all inputs."""
-    problem = modes.problem_in(values)
-    switches = problem.switches
-    assert switches is not None
-    return Graph(
-        problem.rate.inputs, cg.specialize(problem.rate, dict(zip(switches.modes, values, strict=True))).outputs
-    )
 
 
 def _slopes(margin: Graph, point: Array, m: int) -> Array:
