@@ -19,7 +19,7 @@ from cgraph._shared import SMOOTH, intervals, kept_by_first
 from cgraph.extend import Builder, building, folded, topological
 
 from ..systems.arguments import new_variables
-from ..systems.kinematics import changes
+from ..systems.kinematics import changes, numbered_graph
 from ..systems.model import display_names
 from .problem import Problem
 from .switches import Switches
@@ -55,11 +55,11 @@ def switched(problem: Problem) -> Problem:
     names = tuple([str(surface.mode.name) for surface in used])
     switches = Switches(
         names,
-        _numbered(inputs, [surface.quantity for surface in used]),
+        numbered_graph(inputs, [surface.quantity for surface in used]),
         tuple([surface.spacing for surface in used]),
         tuple([surface.is_sign for surface in used]),
-        _numbered(inputs, over),
-        _numbered(inputs, margins),
+        numbered_graph(inputs, over),
+        numbered_graph(inputs, margins),
         tuple(turns),
         display_names(problem.model),
     )
@@ -68,10 +68,6 @@ def switched(problem: Problem) -> Problem:
     more: dict[str, Any] = {name: _widened(getattr(problem, name), names) for name in wide}
     parameters = (*problem.parameters, *names)
     return replace(problem, parameters=parameters, rate=Graph(inputs, outputs), switches=switches, **more)
-
-
-def _numbered(inputs: Sequence[Node], nodes: Sequence[Node]) -> Graph:
-    return Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})
 
 
 def _widened(graph: Graph | None, names: Sequence[str]) -> Graph | None:
@@ -271,11 +267,11 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         for k, hold, share in zip(chosen, holds, shares, strict=True):
             margins += [cg.where(hold, share, 1.0), cg.where(hold, 1.0 - share, 1.0)]
             turns += [(k, -1), (k, 1)]
-    made = replace(switches, margins=_numbered(inputs, margins), turns=tuple(turns), ends=2 * len(chosen))
-    project = _numbered(inputs, onto)
+    made = replace(switches, margins=numbered_graph(inputs, margins), turns=tuple(turns), ends=2 * len(chosen))
+    project = numbered_graph(inputs, onto)
     if problem.projection is not None:
         before = dict(zip(states, problem.projection.outputs.values(), strict=True))
-        project = _numbered(inputs, folded(onto, build, before))
+        project = numbered_graph(inputs, folded(onto, build, before))
     outputs = dict(zip(problem.rate.outputs, rate, strict=True))
     return replace(problem, rate=Graph(inputs, outputs), projection=project, switches=made, slides=True)
 

@@ -18,7 +18,7 @@ from cgraph.extend import Builder
 from ...integrators import Problem
 from ...integrators.rate_in_modes import sliding
 from ...integrators.switches import Switches
-from ...systems.kinematics import changes
+from ...systems.kinematics import changes, numbered_graph
 from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags
@@ -54,7 +54,7 @@ def _drift(problem: Problem, order: int) -> Graph:
     states, rates = problem.rate.inputs[: problem.size], problem.rate.outputs.values()
     seeds = dict(zip(states, rates, strict=True)) | {problem.rate.inputs[problem.size]: cg.constant(1.0)}
     nodes = list(graph.outputs.values())
-    return cg.simplify(Graph(graph.inputs, {f"{k}": dot for k, dot in enumerate(changes(seeds, nodes, Builder()))}))
+    return cg.simplify(numbered_graph(graph.inputs, changes(seeds, nodes, Builder())))
 
 
 @kept_by_first
@@ -146,7 +146,7 @@ class Modes:
     def touched(self, t: float, x: Array, p: Sequence[float]) -> tuple[int, Array] | None:
         """The margin that is zero to rounding at a state, if one is: what a step does not pass; and the state on it."""
         errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))[:, None]
-        point, (watched, turns) = _points(t, x, p, self.values[:, None]), self._watched
+        point, (watched, turns) = self._point(t, x, p), self._watched
         allowed = outputs_of(_gap_errors(self.plain), np.concatenate([point, errors]))[[k for k, _ in turns], 0]
         near = np.abs(outputs_of(watched.values, point)[:, 0]) <= allowed
         if not near.any() or self.slid.any():
@@ -157,7 +157,7 @@ class Modes:
 
     def nears(self, t: float, x: Array, p: Sequence[float], h: float) -> bool:
         """Whether the motion comes to a surface in two steps of h, by its rate."""
-        point, (watched, _) = _points(t, x, p, self.values[:, None]), self._watched
+        point, (watched, _) = self._point(t, x, p), self._watched
         ways = np.append(outputs_of(self.problem.rate, point)[: len(x), 0], 1.0)[:, None]
         ahead = outputs_of(watched.values, point) + 2.0 * h * outputs_of(watched.slopes, point, ways)
         return bool((ahead <= 0.0).any())
@@ -169,7 +169,11 @@ class Modes:
         return quantities(switches.margins, self.plain.size, switches.ends), switches.turns
 
     def _gaps(self, t: float, x: Array, p: Sequence[float]) -> Array:
-        return outputs_of(self._switches.gaps, _points(t, x, p, self.values[:, None]))[:, 0]
+        return outputs_of(self._switches.gaps, self._point(t, x, p))[:, 0]
+
+    def _point(self, t: float, x: Array, p: Sequence[float]) -> Array:
+        """The inputs of a graph, (.., 1)."""
+        return np.concatenate([x, [t], p, self.values])[:, None]
 
     def _decide(self, t: float, x: Array, p: Sequence[float], crossed: Array, number: int = -1) -> None:
         """What holds from here on, of the surfaces at zero; crossed: those of which the mode has turned."""
@@ -177,7 +181,7 @@ class Modes:
         errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))
         for _ in range(len(self.values) + 1):  # a mode that has turned may move the surfaces of later ones
             gaps = self._gaps(t, x, p)
-            point = np.append(_points(t, x, p, self.values[:, None])[:, 0], errors)
+            point = np.append(self._point(t, x, p)[:, 0], errors)
             allowed = outputs_of(_gap_errors(self.plain), point[:, None])[:, 0]
             moved = ~(slid | floors | crossed) & (self.values * gaps < -allowed)
             self.values = np.where(moved, -self.values, self.values)
@@ -356,12 +360,6 @@ class _Choice:
         return None
 
 
-def _points(t: float, x: Array, p: Sequence[float], modes: Array) -> Array:
-    """Inputs (.., N) of a graph at modes (k, N)."""
-    fixed = np.concatenate([x, [t], p])[:, None]
-    return np.concatenate([np.broadcast_to(fixed, (len(fixed), modes.shape[1])), modes])
-
-
 def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Graph, ...]:
     """Graphs of the state by which others than the first surface are crossed; point: of the inputs of the rate.
 
@@ -430,4 +428,4 @@ def _later(problem: Problem, margin: Graph, between: Graph, after: Graph, modes:
         rate = rate + slope * each
     dt = -g / rate
     moved = [x + (a - b) * dt for x, a, b in zip(inputs, one, two, strict=False)]
-    return cg.simplify(Graph(inputs, {f"{k}": node for k, node in enumerate(moved)}))
+    return cg.simplify(numbered_graph(inputs, moved))
