@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,10 +66,7 @@ class DifferentiatedRun:
             segment = self._segment(stretch.beginning_at(begin), x, kept)
             self.segments.append(segment)
             begin, x = float(segment.steps.t[-1]), segment.x
-        self._before_end = list[Array]()
-        for graph in self.motions.after:
-            self._before_end.append(x)
-            x = self._state(self.segments[-1].motions, graph, x, begin)
+        *self._before_end, x = self._made(self.segments[-1].motions, motions.after, x, begin)
         self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
         self.loss = np.zeros(motions.many)
         if motions.running is not None:
@@ -78,7 +75,8 @@ class DifferentiatedRun:
     @property
     def end(self) -> Array:
         """The end of the motions in q and qd, (m, N)."""
-        return self._state(self.segments[-1].motions, self.motions.equations.end, self.x, float(self.t[-1]))
+        motions, graph = self.segments[-1].motions, self.motions.equations.end
+        return self._made(motions, [graph] if graph else [], self.x, float(self.t[-1]))[-1]
 
     @property
     def checkpoints(self) -> int:
@@ -88,10 +86,7 @@ class DifferentiatedRun:
     def _segment(self, steps: Stretch, x: Array, every: int) -> Segment:
         """Run steps from the state x on."""
         motions, many, count = self.motions.in_stretch(steps), self.motions.many, len(steps.h)
-        entered = list[Array]()
-        for graph in steps.entry:
-            entered.append(x)
-            x = self._state(motions, graph, x, float(steps.t[0]))
+        *entered, x = self._made(motions, steps.entry, x, float(steps.t[0]))
         before, step, failed = motion_programs(
             motions.equations,
             motions.options.integrator,
@@ -329,9 +324,9 @@ class DifferentiatedRun:
         moved = values_of(tangent(graph), [*motions.point(x, t), *dots], dots.shape[1])
         return np.concatenate([moved, dots[len(x) :]])
 
-    def _state(self, motions: Motions, graph: Graph | None, x: Array, t: float) -> Array:
-        """The states (m, N) that a graph over the states, t and parameters makes of some; the same without a graph."""
-        return x if graph is None else _outputs(graph, motions.point(x, t))
+    def _made(self, motions: Motions, graphs: Iterable[Graph], x: Array, t: float) -> list[Array]:
+        """States (m, N), and what graphs over states, t and parameters make of them, one after another."""
+        return [*itertools.accumulate(graphs, lambda x, graph: _outputs(graph, motions.point(x, t)), initial=x)]
 
 
 def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
