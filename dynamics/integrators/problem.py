@@ -74,11 +74,6 @@ class Problem:
         """Names of the parameters that a run is given: all but modes."""
         return self.parameters if self.switches is None else self.parameters[: -len(self.switches.modes)]
 
-    @property
-    def portable(self) -> Problem:
-        """The problem without its model, which pickles: enough to step a problem in modes."""
-        return replace(self, model=None, system=None)  # type: ignore[arg-type]
-
     @cached_property
     def timed(self) -> bool:
         """Whether f depends on t."""

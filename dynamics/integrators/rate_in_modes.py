@@ -19,7 +19,7 @@ from cgraph._shared import SMOOTH, intervals, kept_by_first
 from cgraph.extend import Builder, building, folded, topological
 
 from ..systems.arguments import new_variables
-from ..systems.kinematics import changes
+from ..systems.kinematics import changes, numbered_graph
 from ..systems.model import display_names
 from .problem import Problem
 from .switches import Switches
@@ -55,11 +55,11 @@ def switched(problem: Problem) -> Problem:
     names = tuple([str(surface.mode.name) for surface in used])
     switches = Switches(
         names,
-        _numbered(inputs, [surface.quantity for surface in used]),
+        numbered_graph(inputs, [surface.quantity for surface in used]),
         tuple([surface.spacing for surface in used]),
         tuple([surface.is_sign for surface in used]),
-        _numbered(inputs, over),
-        _numbered(inputs, margins),
+        numbered_graph(inputs, over),
+        numbered_graph(inputs, margins),
         tuple(turns),
         display_names(problem.model),
     )
@@ -68,10 +68,6 @@ def switched(problem: Problem) -> Problem:
     more: dict[str, Any] = {name: _widened(getattr(problem, name), names) for name in wide}
     parameters = (*problem.parameters, *names)
     return replace(problem, parameters=parameters, rate=Graph(inputs, outputs), switches=switches, **more)
-
-
-def _numbered(inputs: Sequence[Node], nodes: Sequence[Node]) -> Graph:
-    return Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})
 
 
 def _widened(graph: Graph | None, names: Sequence[str]) -> Graph | None:
@@ -167,7 +163,8 @@ class _Reader:
                 break
         if g.value is not None:
             return cg.constant(math.copysign(sign, g.value * sign)) if g.value else None
-        if _excludes_zero(g):
+        low, high = intervals(topological([g]), {})[g]
+        if low > 0.0 or high < 0.0:
             return None
         if (surface := self._surface(g, 2.0)) is None:
             return None
@@ -185,12 +182,6 @@ class _Reader:
                 self._taken.append(str(mode.name))
             self._surfaces[g, spacing] = _Surface(mode, g, g if spacing == 2.0 else g - mode, spacing)
         return self._surfaces[g, spacing]
-
-
-def _excludes_zero(g: Node) -> bool:
-    """Whether g is on one side of zero for any values of its variables."""
-    low, high = intervals(topological([g]), {})[g]
-    return low > 0.0 or high < 0.0
 
 
 @kept_by_first
@@ -237,43 +228,30 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
     """
     switches = problem.switches
     assert switches is not None
-    build, m = Builder(), problem.size
-    inputs = problem.rate.inputs
+    build, m, inputs, spacing = Builder(), problem.size, problem.rate.inputs, switches.spacing
     modes, states = inputs[len(inputs) - len(switches.modes) :], list(inputs[:m])
     rates, gaps = list(problem.rate.outputs.values()), list(switches.gaps.outputs.values())
     chosen = sorted(among)
     with building(build):
         # of a mode that slides, h = 1, the lower side, else its own
-        holds = [_slides(modes[k], switches.spacing[k]) for k in chosen]
-        lower = {modes[k]: modes[k] - 0.5 * switches.spacing[k] * hold for k, hold in zip(chosen, holds, strict=True)}
-    first, *others = [
-        folded([*rates, *[gaps[k] for k in chosen]], build, side)
-        for side in (
-            lower,
-            *[
-                lower | {modes[k]: lower[modes[k]] + switches.spacing[k] * h}
-                for k, h in zip(chosen, holds, strict=True)
-            ],
-        )
-    ]
+        place = {k: _slides(modes[k], spacing[k]) for k in chosen}
+        lower = {modes[k]: modes[k] - 0.5 * spacing[k] * hold for k, hold in place.items()}
+    holds, read = [*place.values()], [*rates, *[gaps[k] for k in chosen]]
+    sides = [lower, *[lower | {modes[k]: lower[modes[k]] + spacing[k] * hold} for k, hold in place.items()]]
+    first, *others = [folded(read, build, side) for side in sides]
     f, g = first[: len(rates)], first[len(rates) :]
     ways = dict(zip(states, f, strict=False)) | {inputs[m]: cg.constant(1.0)}
     with building(build):
         # g of the upper end of a floor's lower side
-        g = [gap - hold if switches.spacing[k] == 1.0 else gap for k, hold, gap in zip(chosen, holds, g, strict=True)]
+        g = [gap - hold if spacing[k] == 1.0 else gap for k, hold, gap in zip(chosen, holds, g, strict=True)]
         jumps = [[there - here for there, here in zip(other, f, strict=False)] for other in others]
-    drift, columns_of = (
-        _along(g, ways, build),
-        [_along(g, dict(zip(states, jump, strict=False)), build) for jump in jumps],
-    )
+    directions = [ways, *[dict(zip(states, jump, strict=False)) for jump in jumps]]
+    drift, *columns_of = [_along(g, direction, build) for direction in directions]
     # a jump that does not move its g itself, as that of an acceleration by a position, moves the rate of g
-    late = [k for k, column in enumerate(columns_of) if column[k].value == 0.0]
-    if late:
+    if late := [k for k, column in enumerate(columns_of) if column[k].value == 0.0]:
         g = [drift[k] if k in late else gap for k, gap in enumerate(g)]
-        drift = _along(g, ways, build)
-        columns_of = [_along(g, dict(zip(states, jump, strict=False)), build) for jump in jumps]
+        drift, *columns_of = [_along(g, direction, build) for direction in directions]
     surfaces = list(switches.surfaces.outputs.values())
-    pinning = [surfaces[k] if switches.spacing[k] == 2.0 else None for k in chosen]
     with building(build):
         matrix = [
             [cg.where(holds[i] * holds[j], column[i], 1.0 if i == j else 0.0) for j, column in enumerate(columns_of)]
@@ -283,20 +261,17 @@ def sliding(problem: Problem, among: frozenset[int]) -> Problem:
         shares, moves = _solved(matrix, rights)
         rate = [_mixed(each, shares, [jump[i] for jump in jumps]) for i, each in enumerate(f)]
         onto = [_mixed(each, moves, [jump[i] for jump in jumps]) for i, each in enumerate(states)]
-        _pin(rate, onto, inputs, [(g, hold) for g, hold in zip(pinning, holds, strict=True) if g is not None], build)
-        place = dict(zip(chosen, holds, strict=True))
+        _pin(rate, onto, inputs, [(surfaces[k], hold) for k, hold in place.items() if spacing[k] == 2.0], build)
         turns, margins = list(switches.turns), list(switches.margins.outputs.values())
         margins = [cg.where(place[k], 1.0, g) if k in place else g for (k, _), g in zip(turns, margins, strict=True)]
         for k, hold, share in zip(chosen, holds, shares, strict=True):
             margins += [cg.where(hold, share, 1.0), cg.where(hold, 1.0 - share, 1.0)]
             turns += [(k, -1), (k, 1)]
-    made = replace(switches, margins=_numbered(inputs, margins), turns=tuple(turns), ends=2 * len(chosen))
-    project = _numbered(inputs, onto)
+    made = replace(switches, margins=numbered_graph(inputs, margins), turns=tuple(turns), ends=2 * len(chosen))
+    project = numbered_graph(inputs, onto)
     if problem.projection is not None:
-        nodes = list(problem.projection.outputs.values())
-        project = _numbered(
-            inputs, folded(list(project.outputs.values()), build, dict(zip(states, nodes, strict=True)))
-        )
+        before = dict(zip(states, problem.projection.outputs.values(), strict=True))
+        project = numbered_graph(inputs, folded(onto, build, before))
     outputs = dict(zip(problem.rate.outputs, rate, strict=True))
     return replace(problem, rate=Graph(inputs, outputs), projection=project, switches=made, slides=True)
 
@@ -317,10 +292,8 @@ def _pin(
             continue
         i = free[-1]
         pinned.add(i)
-        (way,), (off,) = (
-            _along([g], {t: cg.constant(1.0)}, build),
-            folded([g], build, dict(zip(states, onto, strict=True))),
-        )
+        (way,) = _along([g], {t: cg.constant(1.0)}, build)
+        (off,) = folded([g], build, dict(zip(states, onto, strict=True)))
         for j, number in numbers.items():
             if j != i:
                 way = way + number * rate[j]
@@ -354,10 +327,7 @@ def _solved(matrix: list[list[Node]], rights: list[list[Node]]) -> list[list[Nod
             factor = matrix[i][k] / pivots[k]
             if factor.value == 0.0:
                 continue
-            matrix[i] = [
-                *matrix[i][: k + 1],
-                *[a - factor * b for a, b in zip(matrix[i], matrix[k], strict=True)][k + 1 :],
-            ]
+            matrix[i] = [a - factor * b for a, b in zip(matrix[i], matrix[k], strict=True)]
             for right in rights:
                 right[i] = right[i] - factor * right[k]
     for right in rights:

@@ -18,7 +18,7 @@ from .left_out import warned
 from .mujoco_module import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
 from .read_urdf import add_floating_base, origin_of, read_urdf
-from .smooth_forces import smooth
+from .smooth_forces import Smooth, smooth
 from .source import called, is_text, require_root, root_of, urdf_root
 
 if TYPE_CHECKING:
@@ -160,37 +160,25 @@ def load_urdf(
     return warned(read_urdf(urdf_root(source), called(source), ignore, floating, taken), called(source))
 
 
-def load_at_start(
-    source: Source,
-    *,
-    ignore: bool = False,
-    floating: bool = False,
-    limits: Sequence[float] | None = None,
-    friction: float | None = None,
-    actuators: bool = False,
-    contacts: Material | None = None,
-) -> tuple[Mechanism, tuple[float, ...]]:
+def load_at_start(source: Source, ignore: bool, floating: bool, taken: Smooth) -> tuple[Mechanism, tuple[float, ...]]:
     """The mechanism of MJCF or URDF, by the root element, and the coordinates (nq,) at which the file has it.
 
     Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral,
     but that a root link that floats stands on the ground, where it has contacts: its lowest sphere touches it.
-    Options are those of `load_mjcf` and `load_urdf`. Raises as these do, for `floating` of MJCF, which says itself what
-    is free, and for `actuators` of URDF, which has none.
+    ignore, floating: as of `load_mjcf` and `load_urdf`. Raises as these do, for `floating` of MJCF, which says itself
+    what is free, and for actuators of URDF, which has none.
     """
+    name = called(source)
     if root_of(source) == "robot" or (not is_text(source) and str(source).lower().endswith(".urdf")):
-        if require_flag("actuators", actuators):
-            raise MechanismError(f"actuators go with MJCF, and URDF, as is {called(source)}, has none")
-        mechanism = load_urdf(
-            source, ignore=ignore, floating=floating, limits=limits, friction=friction, contacts=contacts
-        )
+        if taken.actuators:
+            raise MechanismError(f"actuators go with MJCF, and URDF, as is {name}, has none")
+        mechanism = warned(read_urdf(urdf_root(source), name, ignore, floating, taken), name)
         return mechanism, tuple(standing(mechanism, neutral(mechanism.moving), floating))
     if require_flag("floating", floating):
-        raise MechanismError(
-            f"floating goes with URDF, and MJCF, as is {called(source)}, says itself which bodies float"
-        )
+        raise MechanismError(f"floating goes with URDF, and MJCF, as is {name}, says itself which bodies float")
     require_root(source, "mujoco", root_of(source))
-    taken, mj = smooth(limits, friction, actuators, contacts), compiled_mjcf(source, called(source))
-    return warned(read_mjcf(mj, ignore, taken), called(source)), tuple(mj.qpos0.tolist())
+    mj = compiled_mjcf(source, name)
+    return warned(read_mjcf(mj, ignore, taken), name), tuple(mj.qpos0.tolist())
 
 
 def compiled(source: Source, *, floating: bool = False) -> MjModel:

@@ -12,23 +12,19 @@ from cgraph._shared import Array
 from ..multibody.algebra import spatial
 from .contacts import Ball, capsule_ends
 from .left_out import listed, present
-from .mujoco_module import mujoco
+from .mujoco_module import mujoco, word_of
 from .smooth_forces import disabled
 
 if TYPE_CHECKING:
     from mujoco import MjModel
 
+TAKEN = (("plane", "sphere"), ("plane", "capsule"), ("sphere", "sphere"))  # kinds of geoms that meet
 SLIDING = 3  # dimensions of a contact with friction that slides and does no more
 
 
 def has_balls(mj: MjModel) -> bool:
     """Whether spheres or capsules are among the shapes."""
-    return bool(np.isin(mj.geom_type, _kinds()[1:]).any())
-
-
-def _kinds() -> tuple[int, int, int]:
-    types = mujoco().mjtGeom
-    return int(types.mjGEOM_PLANE), int(types.mjGEOM_SPHERE), int(types.mjGEOM_CAPSULE)
+    return any([word_of("Geom", kind) in ("sphere", "capsule") for kind in mj.geom_type])
 
 
 def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Ball], list[str]]:
@@ -38,31 +34,30 @@ def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Bal
     """
     if disabled(mj, "CONSTRAINT", "CONTACT"):
         return [], []
-    plane, sphere, capsule = _kinds()
-    data = mujoco().MjData(mj)
+    words, data = [word_of("Geom", kind) for kind in mj.geom_type], mujoco().MjData(mj)
     mujoco().mj_kinematics(mj, data)  # planes stand still
     balls: list[Ball] = []
     others: list[str] = []
     rolling, weld = False, mj.body_weldid[mj.geom_bodyid]
     for (first, second), (friction, dimensions) in _meetings(mj).items():
-        ground, geom = sorted((first, second), key=lambda g: (int(mj.geom_type[g]) != plane, weld[g] != 0))
-        kinds = int(mj.geom_type[ground]), int(mj.geom_type[geom])
-        known = kinds in ((plane, sphere), (plane, capsule), (sphere, sphere)) and weld[ground] != weld[geom]
-        if not known or (kinds[0] == sphere and (data.geom_xpos[ground] == data.geom_xpos[geom]).all()):
+        ground, geom = sorted((first, second), key=lambda g: (words[g] != "plane", weld[g] != 0))
+        kinds = words[ground], words[geom]
+        known = kinds in TAKEN and weld[ground] != weld[geom]
+        if not known or (kinds[0] == "sphere" and (data.geom_xpos[ground] == data.geom_xpos[geom]).all()):
             others.append(f"{_called(mj, first)} and {_called(mj, second)}")
             continue
         rolling |= dimensions > SLIDING
         (body, origin), (to, to_origin) = (ends[int(mj.geom_bodyid[each])] for each in (geom, ground))
         center, radius = origin + mj.geom_pos[geom], float(mj.geom_size[geom, 0])
         against: dict[str, Any] = {"friction": friction if dimensions >= SLIDING else 0.0}
-        if kinds[0] == plane:
+        if kinds[0] == "plane":
             normal = spatial.snapped(data.geom_xmat[ground].reshape(3, 3)[:, 2])
             against |= {"to_at": data.geom_xpos[ground].copy(), "normal": normal}
         else:
             against |= {"to": to, "to_at": spatial.cleaned(to_origin + mj.geom_pos[ground])}
             against |= {"to_radius": float(mj.geom_size[ground, 0])}
         axis = spatial.from_quaternion(mj.geom_quat[geom])[:, 2]
-        centers = capsule_ends(center, axis, float(mj.geom_size[geom, 1])) if kinds[1] == capsule else [center]
+        centers = capsule_ends(center, axis, float(mj.geom_size[geom, 1])) if kinds[1] == "capsule" else [center]
         balls += [Ball(body, spatial.cleaned(at), radius, **against) for at in centers]
     sentences = {
         f"contacts other than of spheres, and of capsules with planes ({listed(others)})": others,

@@ -35,6 +35,12 @@ def _warn(text: str) -> None:
         warnings.warn(f"MuJoCo: {' '.join(text.split())}", stacklevel=2)
 
 
+def word_of(kind: str, value: int) -> str:
+    """MuJoCo's word for a value of one of its enumerations, as "hinge" for one of "Joint"."""
+    name: str = getattr(mujoco(), f"mjt{kind}")(int(value)).name
+    return name.partition("_")[2].lower()
+
+
 def text_of(spec: MjSpec) -> str:
     """The MJCF text that MuJoCo writes of a compiled spec, with all digits.
 

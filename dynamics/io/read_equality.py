@@ -15,7 +15,7 @@ from ..multibody.algebra import spatial
 from ..multibody.bodies.body import WORLD, Body, MechanismError
 from ..multibody.loops import Loop
 from .left_out import listed, present
-from .mujoco_module import mujoco
+from .mujoco_module import word_of
 from .smooth_forces import disabled, fixed_tendon
 
 if TYPE_CHECKING:
@@ -88,8 +88,7 @@ def _is_modelled(mj: MjModel, i: int) -> bool:
 
 
 def _kind(mj: MjModel, i: int) -> str:
-    kind: str = mujoco().mjtEq(int(mj.eq_type[i])).name
-    return kind.removeprefix("mjEQ_").lower()
+    return word_of("Eq", mj.eq_type[i])
 
 
 def _loop(mj: MjModel, i: int, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> Loop:
@@ -131,7 +130,7 @@ def _coupled(mj: MjModel, i: int, which: int, moving: Sequence[Body]) -> str | d
 def _sites(mj: MjModel, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End] | None:
     """The sites that are held together; None where the constraint is of bodies."""
     kinds = getattr(mj, "eq_objtype", None)
-    if kinds is None or int(kinds[i]) != int(mujoco().mjtObj.mjOBJ_SITE):
+    if kinds is None or word_of("Obj", kinds[i]) != "site":
         return None
     sites = []
     for site in (int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])):

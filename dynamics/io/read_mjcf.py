@@ -22,7 +22,7 @@ from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, Mechanism
 from .contacts import untaken, with_contacts
 from .left_out import listed, present, refused_or_left_out
 from .mjcf_contacts import has_balls, mjcf_balls
-from .mujoco_module import mujoco
+from .mujoco_module import mujoco, word_of
 from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import (
     NONE,
@@ -31,6 +31,7 @@ from .smooth_forces import (
     disabled,
     first_output,
     fixed_tendon,
+    gain_and_bias,
     input_names,
     inputs,
     is_linear,
@@ -188,9 +189,7 @@ def _joint(mj: MjModel, j: int, position: Array, orientation: Array) -> Joint:
 
 def _kind(mj: MjModel, j: int) -> str:
     """Our kind of a joint, "" for the kinds that a mechanism has not."""
-    types = mujoco().mjtJoint
-    kinds = {int(getattr(types, f"mjJNT_{each.mjcf.upper()}")): kind for kind, each in TYPES.items() if each.mjcf}
-    return kinds.get(int(mj.jnt_type[j]), "")
+    return {each.mjcf: kind for kind, each in TYPES.items()}.get(word_of("Joint", mj.jnt_type[j]), "")
 
 
 def _not_modelled(mj: MjModel) -> list[str]:
@@ -247,10 +246,9 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
 
 def _at_rest(mj: MjModel, i: int) -> str:
     """The force of an actuator whose input is 0, "" for none."""
-    kind: str = mujoco().mjtBias(int(mj.actuator_biastype[i])).name.removeprefix("mjBIAS_").lower()
-    if kind not in ("none", "affine"):
+    if (kind := word_of("Bias", mj.actuator_biastype[i])) not in ("none", "affine"):
         return kind
-    numbers = zip(mj.actuator_biasprm[i, :3] * (kind == "affine"), ("", " length", " velocity"), strict=True)
+    numbers = zip(gain_and_bias(mj, i)[1], ("", " length", " velocity"), strict=True)
     terms = [f"{number:+g}{of}" for number, of in numbers if number]
     limited = [] if disabled(mj, "CLAMPCTRL") else [k for k in inputs(mj, i) if mj.actuator_ctrllimited[k]]
     nearest = [float(np.clip(0.0, *mj.actuator_ctrlrange[k])) for k in limited]

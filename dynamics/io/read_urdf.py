@@ -14,7 +14,7 @@ from cgraph._shared import Array, require_flag
 from ..multibody.algebra import spatial
 from ..multibody.bodies.body import moment_rounding
 from ..multibody.bodies.limits import ANYTHING, NO_LIMITS, Limits
-from ..multibody.forces.joint_force import JointForce, JointFriction
+from ..multibody.forces.joint_force import JointForce, JointFriction, JointLimit
 from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
@@ -311,7 +311,7 @@ def _forces(
     for name, joint in joints.items():
         body = _end(joint, name, "child")
         if smooth.limits is not None and name in ranges and name not in points:
-            forces.append(smooth.limit(body, *ranges[name]))
+            forces.append(JointLimit(body, *ranges[name], *smooth.limits))
         if smooth.friction is not None and name in rubbing:
             forces.append(JointFriction(body, losses[name], smooth.friction))
     rough = [name for name in losses if smooth.friction is None or name not in rubbing]
@@ -387,6 +387,7 @@ def read_mimics(joints: Mapping[str, Element]) -> tuple[dict[str, str], list[str
     circle = [name for name in leaders if follows_itself(name, leaders)]
     others = [name for name in leaders if name not in (*astray, *circle)]
     several = [name for name in others if not {kinds[name], kinds[leaders[name]]} <= {*_SINGLE}]
+    after = {name: f"{name} after {leader}" for name, leader in leaders.items()}
     refused = {
         "joints that mimic one that is not there": astray,
         "joints that mimic one another in a circle": circle,
@@ -394,9 +395,5 @@ def read_mimics(joints: Mapping[str, Element]) -> tuple[dict[str, str], list[str
     }
     return (
         {name: leaders[name] for name in others if name not in several},
-        present({f"{what} ({_after(names, leaders)})": names for what, names in refused.items()}),
+        present({f"{what} ({listed([after[name] for name in names])})": names for what, names in refused.items()}),
     )
-
-
-def _after(names: Sequence[str], leaders: Mapping[str, str]) -> str:
-    return listed([f"{name} after {leaders[name]}" for name in names])

@@ -20,7 +20,7 @@ from ..multibody.bodies.limits import ANYTHING, Limits
 from ..multibody.forces.external_force import Force
 from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, JointSpring, Range
 from .contacts import Material, asked
-from .mujoco_module import mujoco
+from .mujoco_module import mujoco, word_of
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -40,11 +40,6 @@ class Smooth:
     friction: float | None = None
     actuators: bool = False
     contacts: Mapping[str, float | str] | None = None
-
-    def limit(self, body: str | Mapping[str, float], lower: float, upper: float) -> JointLimit:
-        """The limit of a joint, or of several together."""
-        assert self.limits is not None
-        return JointLimit(body, lower, upper, *self.limits)
 
 
 NONE = Smooth()
@@ -75,8 +70,7 @@ def disabled(mj: MjModel, *what: str) -> bool:
 
 def single(mj: MjModel, j: int) -> bool:
     """Whether a joint of MuJoCo's model is a hinge or slide."""
-    types = mujoco().mjtJoint
-    return int(mj.jnt_type[j]) in (int(types.mjJNT_HINGE), int(types.mjJNT_SLIDE))
+    return word_of("Joint", mj.jnt_type[j]) in ("hinge", "slide")
 
 
 def modelled(mj: MjModel, i: int) -> bool:
@@ -85,19 +79,19 @@ def modelled(mj: MjModel, i: int) -> bool:
     On a site or free joint it is without a share of the velocity. If the whole force on a joint has a range, only one
     that acts on this joint alone, and is alone there, is taken.
     """
-    joints, on_tendon = _joints(mj, i), _called("Trn", mj.actuator_trntype[i]) == "tendon"
+    joints, on_tendon = _joints(mj, i), word_of("Trn", mj.actuator_trntype[i]) == "tendon"
     ranged = [j for j in joints or range(mj.njnt) if mj.jnt_actfrclimited[j]]
     others = [_joints(mj, k) or range(mj.njnt) for k in range(actuators(mj)) if k != i]
     shared = on_tendon or not joints or any([j in other or mj.jnt_actgravcomp[j] for j in ranged for other in others])
     return (
-        _called("Dyn", mj.actuator_dyntype[i]) == "none"
-        and _called("Gain", mj.actuator_gaintype[i]) in ("fixed", "affine")
-        and _called("Bias", mj.actuator_biastype[i]) in ("none", "affine")
+        word_of("Dyn", mj.actuator_dyntype[i]) == "none"
+        and word_of("Gain", mj.actuator_gaintype[i]) in ("fixed", "affine")
+        and word_of("Bias", mj.actuator_biastype[i]) in ("none", "affine")
         and not (ranged and shared)
         and not (on_tendon and mj.tendon_actfrclimited[mj.actuator_trnid[i, 0]])
-        and not _delayed(mj, i)
+        and not getattr(mj, "actuator_delay", [0.0] * (i + 1))[i] > 0.0  # in newer versions of MuJoCo
         and len(inputs(mj, i)) == 1
-        and bool(joints or (_is_wrench(mj, i) and not any([numbers[2] for numbers in _gain_and_bias(mj, i)])))
+        and bool(joints or (_is_wrench(mj, i) and not any([numbers[2] for numbers in gain_and_bias(mj, i)])))
     )
 
 
@@ -106,21 +100,20 @@ def _joints(mj: MjModel, i: int) -> dict[int, float]:
     at = int(mj.actuator_trnid[i, 0])
     if _on_joint(mj, i):
         return {at: 1.0} if single(mj, at) else {}
-    return fixed_tendon(mj, at) if _called("Trn", mj.actuator_trntype[i]) == "tendon" else {}
+    return fixed_tendon(mj, at) if word_of("Trn", mj.actuator_trntype[i]) == "tendon" else {}
 
 
 def _is_wrench(mj: MjModel, i: int) -> bool:
     """Whether an actuator pushes a site against the world, or a free body."""
     at, reference = mj.actuator_trnid[i].tolist()
-    free = int(mujoco().mjtJoint.mjJNT_FREE)
-    on_site = _called("Trn", mj.actuator_trntype[i]) == "site" and reference < 0
-    return on_site or (_on_joint(mj, i) and int(mj.jnt_type[at]) == free)
+    on_site = word_of("Trn", mj.actuator_trntype[i]) == "site" and reference < 0
+    return on_site or (_on_joint(mj, i) and word_of("Joint", mj.jnt_type[at]) == "free")
 
 
 def fixed_tendon(mj: MjModel, tendon: int) -> dict[int, float]:
     """{joint: coefficient} of a fixed tendon, empty for a spatial one."""
     rows = range(mj.tendon_adr[tendon], mj.tendon_adr[tendon] + mj.tendon_num[tendon])
-    if any([int(mj.wrap_type[k]) != int(mujoco().mjtWrap.mjWRAP_JOINT) for k in rows]):
+    if any([word_of("Wrap", mj.wrap_type[k]) != "joint" for k in rows]):
         return {}
     return {int(mj.wrap_objid[k]): float(mj.wrap_prm[k]) for k in rows}
 
@@ -136,14 +129,8 @@ def actuators(mj: MjModel) -> int:
     return len(mj.actuator_trntype)
 
 
-def _called(kind: str, value: int) -> str:
-    """MuJoCo's word for a type of a transmission, gain, ..."""
-    word: str = getattr(mujoco(), f"mjt{kind}")(int(value)).name
-    return word.removeprefix(f"mj{kind.upper()}_").lower()
-
-
 def _on_joint(mj: MjModel, i: int) -> bool:
-    return _called("Trn", mj.actuator_trntype[i]) in ("joint", "jointinparent")
+    return word_of("Trn", mj.actuator_trntype[i]) in ("joint", "jointinparent")
 
 
 def inputs(mj: MjModel, i: int) -> range:
@@ -155,12 +142,6 @@ def inputs(mj: MjModel, i: int) -> range:
 def first_output(mj: MjModel, i: int) -> int:
     """Index of an actuator's first output among all."""
     return int(getattr(mj, "actuator_outadr", range(i + 1))[i])
-
-
-def _delayed(mj: MjModel, i: int) -> bool:
-    """Whether an actuator acts later than its input, as in newer versions of MuJoCo."""
-    delays = np.asarray(getattr(mj, "actuator_delay", []))
-    return bool(delays.size and delays[i] > 0.0)
 
 
 def mjcf_forces(
@@ -185,7 +166,7 @@ def mjcf_forces(
         limited = getattr(mj, f"{what}_limited")[i] and not disabled(mj, "CONSTRAINT", "LIMIT")
         if taken.limits is not None and limited and of and (what == "tendon" or single(mj, i)):
             (lower, upper), margin = getattr(mj, f"{what}_range")[i].tolist(), float(getattr(mj, f"{what}_margin")[i])
-            forces.append(taken.limit(of, lower + margin, upper - margin))
+            forces.append(JointLimit(of, lower + margin, upper - margin, *taken.limits))
         if taken.friction is not None and losses[k] and of and not disabled(mj, "CONSTRAINT", "FRICTIONLOSS"):
             forces.append(JointFriction(of, losses[k], taken.friction))
     if taken.actuators and not disabled(mj, "ACTUATION"):
@@ -201,7 +182,7 @@ def _pushes(mj: MjModel, i: int, actuator: Actuator, ends: Sequence[tuple[str, A
     at = int(mj.actuator_trnid[i, 0])
     with building(Builder()):
         (force,) = actuator.along([ZERO], [ZERO], {actuator.input: cg.variable(actuator.input)})
-        gear, kind = np.reshape(mj.actuator_gear[first_output(mj, i)], (2, 3)), _called("Trn", mj.actuator_trntype[i])
+        gear, kind = np.reshape(mj.actuator_gear[first_output(mj, i)], (2, 3)), word_of("Trn", mj.actuator_trntype[i])
         if kind == "site":
             gear = gear @ spatial.from_quaternion(mj.site_quat[at]).T
         push, turn = ([float(share) * force for share in row] for row in gear)
@@ -229,12 +210,12 @@ def input_names(mj: MjModel) -> list[str]:
     return names
 
 
-def _gain_and_bias(mj: MjModel, i: int) -> tuple[list[float], list[float]]:
+def gain_and_bias(mj: MjModel, i: int) -> tuple[list[float], list[float]]:
     """Of 1, length and velocity."""
     gain, bias = mj.actuator_gainprm[i, :3].tolist(), mj.actuator_biasprm[i, :3].tolist()
-    if _called("Gain", mj.actuator_gaintype[i]) == "fixed":
+    if word_of("Gain", mj.actuator_gaintype[i]) == "fixed":
         gain[1:] = 0.0, 0.0
-    if _called("Bias", mj.actuator_biastype[i]) == "none":
+    if word_of("Bias", mj.actuator_biastype[i]) == "none":
         bias = [0.0, 0.0, 0.0]
     return gain, bias
 
@@ -248,7 +229,7 @@ def _actuator(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Actuato
         next(iter(shares)) if on_joint else shares,
         name,
         float(mj.actuator_gear[first_output(mj, i), 0]) if joints else 1.0,
-        *_gain_and_bias(mj, i),
+        *gain_and_bias(mj, i),
         None if disabled(mj, "CLAMPCTRL") else _range(mj, "actuator_ctrl", inputs(mj, i)[0]),
         _range(mj, "actuator_force", i),
         _range(mj, "jnt_actfrc", next(iter(joints))) if on_joint else None,
@@ -271,7 +252,7 @@ def joint_limits(mj: MjModel, j: int) -> Limits:
 
 def _effort(mj: MjModel, i: int) -> Range:
     """What an actuator can do along its joint: gear times its force, which its input gives where it is a motor."""
-    kinds = [_called(kind, getattr(mj, f"actuator_{kind.lower()}type")[i]) for kind in ("Dyn", "Gain", "Bias")]
+    kinds = [word_of(kind, getattr(mj, f"actuator_{kind.lower()}type")[i]) for kind in ("Dyn", "Gain", "Bias")]
     ctrl, force = inputs(mj, i), ANYTHING
     if kinds == ["none", "fixed", "none"] and len(ctrl) == 1 and not disabled(mj, "CLAMPCTRL"):
         force = _scaled(mj.actuator_gainprm[i, 0], _range(mj, "actuator_ctrl", ctrl[0]))

@@ -18,6 +18,7 @@ from cgraph import Node
 from cgraph._shared import nearest, or_nearest, real_array, real_number
 
 from ..io.load import load_at_start
+from ..io.smooth_forces import smooth
 from ..multibody.bodies.limits import NO_LIMITS, Limits
 from ..multibody.builders.planar_arm import planar_arm
 from ..multibody.trees.mechanism import Mechanism, as_mechanism
@@ -215,15 +216,7 @@ def of_file(
     ValueError
         As `load_mjcf` and `load_urdf` do, for `floating` of MJCF, and for `actuators` of URDF.
     """
-    mechanism, q = load_at_start(
-        path,
-        ignore=ignore,
-        floating=floating,
-        limits=limits,
-        friction=friction,
-        actuators=actuators,
-        contacts=contacts,
-    )
+    mechanism, q = load_at_start(path, ignore, floating, smooth(limits, friction, actuators, contacts))
     about = f"{len(mechanism.moving)} moving bodies of {os.fspath(path)}"
     return Scene(Path(path).stem, about, mechanism, q, (0.0,) * mechanism.system.n, 3.0)
 

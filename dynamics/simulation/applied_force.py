@@ -149,20 +149,18 @@ class Hold:
         return HeldForces(np.array(self.times), np.array(self.forces).reshape(-1, len(self.velocities)))
 
     def _called(self, t: float, x: Array) -> list[float]:
-        names, qd = self.velocities, x[self.nq :]
+        names, qd, what = self.velocities, x[self.nq :], "the controller's forces"
         try:
             if self.observed is not None:
                 qd = self.observed(np.concatenate([x, [t], np.zeros(len(qd))]))  # they do not depend on the forces
             with np.errstate(all="warn"):
-                forces = real_array(
-                    "the controller's forces", self.controller.function(x[: self.nq].copy(), qd.copy(), t)
-                )
+                forces = real_array(what, self.controller.function(x[: self.nq].copy(), qd.copy(), t))
             if forces.shape != (len(names),):
                 needed = f"({len(names)},), one for each of {', '.join(names)}"
-                raise ValueError(f"the controller's forces must have shape {needed}; got {forces.shape}")
+                raise ValueError(f"{what} must have shape {needed}; got {forces.shape}")
             if not (good := np.isfinite(forces)).all():
                 name = names[int(np.argmin(good))]
-                raise ValueError(f"the controller's forces must be finite, got {forces.tolist()}: that of {name!r}")
+                raise ValueError(f"{what} must be finite, got {forces.tolist()}: that of {name!r}")
         except Exception as error:
             error.add_note(f"in the controller at t = {t:.6g} s")
             raise

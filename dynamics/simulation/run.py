@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Array, HoldsNodes, floats, kept_by_first, real_number, require_kind
+from cgraph._shared import Array, HoldsNodes, floats, real_number, require_kind
 
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import initial_values, note_start, other_inputs, start_state
@@ -42,7 +42,7 @@ from .run_options import TABLES, Span, Steps, require_room
 from .stepper import Stepper, stepper_of
 from .steps.dense_output import Solution, StepBlock
 from .steps.equal_steps import step_count
-from .steps.row_values import converted
+from .steps.row_values import compiled, converted
 from .trajectory import Sides, SimulationWarning, Trajectory
 
 if TYPE_CHECKING:
@@ -327,8 +327,7 @@ class Run(HoldsNodes):
         require_kind("parameters", parameters, Mapping, "a mapping of names to numbers")
         values = {name: parameter_value(name, each) for name, each in parameters.items() if name not in self._varied}
         key = tuple([(name, value.hex()) for name, value in values.items()])  # which tells 0.0 and -0.0 apart
-        found: Run = self._made(key, partial(replace, self, _parameters=values)) if values else self
-        return found
+        return self._made(key, partial(replace, self, _parameters=values)) if values else self
 
     @property
     def _is_of_steps_alone(self) -> bool:
@@ -382,7 +381,7 @@ class Run(HoldsNodes):
         if applied.controller is not None:
             if span.direction < 0.0:
                 raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
-            observed = None if stepped.velocities is None else _compiled(stepped.velocities, self._options.backend)
+            observed = None if stepped.velocities is None else compiled(stepped.velocities, self._options.backend)
             hold = Hold(applied.controller, applied.model.velocities, stepped.nq, span.t0, observed)
         run = self._stepper(p, hold, rows=span.has_inner_times)
         x = converted(stepped.momentum, span.t0, start, values)
@@ -476,9 +475,3 @@ def _specialized(graph: Graph, bound: Mapping[str, float]) -> Graph:
     """The graph with those of its inputs built in that have a value."""
     known = {name: value for name, value in bound.items() if name in graph.input_names}
     return cg.specialize(graph, known) if known else graph
-
-
-@kept_by_first
-def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
-    """The velocities of momenta, for a controller."""
-    return cg.compile(velocities, backend)

@@ -244,10 +244,8 @@ class Stepper(ABC):
                 moves = t != part.t_old[row]
                 last = part.part(slice(row + moves))
                 first = int(np.flatnonzero(block.t_old == part.t_old[0])[0])
-                return [
-                    *[block.part(slice(first))][: first > 0],
-                    last.shortened(crossing.s, t, x) if moves else last,
-                ], crossing
+                before = [block.part(slice(first))] if first else []
+                return [*before, last.shortened(crossing.s, t, x) if moves else last], crossing
         self.modes.see(block.x)
         return [block], None
 
@@ -300,12 +298,9 @@ class Stepper(ABC):
 
     def _is_looked_at(self, span: Span) -> bool:
         """Whether a run over this span has to have every step in a block."""
-        estimated, held = self.options.estimated, self.program.rows is not None
-        own = (
-            span.has_inner_times or held or self.options.relative < self._relative
-            if self.program.adaptive
-            else estimated
-        )
+        own = self.options.estimated
+        if self.program.adaptive:
+            own = span.has_inner_times or self.program.rows is not None or self.options.relative < self._relative
         return own or self.every_step or span.times is None or self.events is not None or self.modes is not None
 
     @property
@@ -523,7 +518,7 @@ class ChosenStepper(Stepper):
             self._count_trials()
             if len(rows):
                 self._look(rows, absolute)
-                yield self._block(rows)
+                yield self.program.block(rows)
             if self._numbers[self._stop] == CROSSED:  # a surface that is touched
                 self._set(status=DONE if self.t == self._number("end") else RUNNING)
             self._judge(rows)
@@ -583,14 +578,6 @@ class ChosenStepper(Stepper):
         wanted = wanted if math.isfinite(wanted) else span.length  # Taylor's method chooses it by itself
         self._set(end=self._hold(self.control, span.t_end), next=wanted, fresh=1.0, status=RUNNING)
         return True
-
-    def _block(self, rows: Array) -> StepBlock:
-        m = self.program.size
-        t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m]
-        if not self.program.dense:
-            return StepBlock(t, x, t - h, h, np.full_like(x, math.nan), None)
-        t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
-        return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m), self.program.normalization)
 
     def _look(self, rows: Array, absolute: Array) -> None:
         """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""

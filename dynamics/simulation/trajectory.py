@@ -285,11 +285,8 @@ class Trajectory:
         """
         names, columns = ["t"], [self.t[:, np.newaxis], self.q]
         if self.velocities:
-            names += [
-                *[f"q.{name}" for name in self.coordinates],
-                *[f"qd.{name}" for name in self.velocities],
-                "energy",
-            ]
+            names += [f"q.{name}" for name in self.coordinates]
+            names += [*[f"qd.{name}" for name in self.velocities], "energy"]
             columns += [self.qd, self.energy[:, np.newaxis]]
             applied = self.graphs["tau"].outputs.values() if "tau" in self.graphs else ()
             if self.held is not None or any([node.value != 0.0 for node in applied]):

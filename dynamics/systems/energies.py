@@ -45,12 +45,8 @@ def energies(lagrangian: Node, velocities: Sequence[Node]) -> Energies:
     more, below, both = _by_rest(added(rest), velocities)
     found = added([*kinetic, (1, more)])
     both = found if both is more else added([*kinetic, (1, both)])
-    return Energies(
-        found,
-        added([*[(-sign, node) for sign, node in potential], (1, below)]),
-        both,
-        "the terms of L tagged 'kinetic'",
-    )
+    still = added([*[(-sign, node) for sign, node in potential], (1, below)])
+    return Energies(found, still, both, "the terms of L tagged 'kinetic'")
 
 
 def split_by_motion(lagrangian: Node, velocities: Sequence[Node]) -> tuple[Node, Node]:

@@ -36,6 +36,11 @@ def dot(a: Sequence[Node], b: Sequence[Node]) -> Node:
     return sum([x * y for x, y in zip(a, b, strict=True)], ZERO)
 
 
+def numbered_graph(inputs: Sequence[Node], nodes: Sequence[Node]) -> Graph:
+    """The graph whose outputs are called 0, 1, ..."""
+    return Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})
+
+
 class Kinematics:
     """qdot = G(q) u of a system, and its transpose.
 
@@ -124,7 +129,7 @@ class Kinematics:
             c = [dot(row, v) for row in self.brackets(build)]
             spanned = self.rate(c)
         outputs = [*bent, *straight, *spanned, *[node for row in slopes for node in row]]
-        graph = Graph([*self.q, *u, *v], {f"{k}": node for k, node in enumerate(outputs)})
+        graph = numbered_graph([*self.q, *u, *v], outputs)
         self._compare(graph, n)
 
     def _compare(self, graph: Graph, n: int) -> None:

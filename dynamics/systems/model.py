@@ -82,8 +82,7 @@ def as_system(model: Model) -> System:
 
 def as_ode(model: Model) -> OdeSystem | None:
     """The first-order system of a model; None for a mechanical one."""
-    ode: OdeSystem | None = getattr(_made(model), "ode", None)
-    return ode
+    return getattr(_made(model), "ode", None)
 
 
 def as_equations(model: Model) -> Equations:

@@ -39,18 +39,20 @@ class LagrangeTerms(NamedTuple):
 
 def chain_rule(system: System) -> LagrangeTerms:
     """Section 3: d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, one forward."""
-    momentum, rate, gradient = lagrange_sweeps(system, system.lagrangian, Builder())
+    momentum, rate, gradient = lagrange_sweeps(system, system.lagrangian, Builder(), system.qdd)
     return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
 
 
-def lagrange_sweeps(system: System, lagrangian: Node, build: Builder) -> tuple[list[Node], list[Node], list[Node]]:
-    """p = dL/dqd, d/dt p and dL/dq of a Lagrangian or a part of it."""
+def lagrange_sweeps(
+    system: System, lagrangian: Node, build: Builder, qdd: Sequence[Node] | None
+) -> tuple[list[Node], list[Node], list[Node]]:
+    """p = dL/dqd, d/dt p, at qdd or at 0, and dL/dq of a Lagrangian or a part of it."""
     # The reverse sweep over L gives both dL/dq and p = dL/dqd; q and qd are independent inputs (Section 2.2).
     bars = cotangents({lagrangian: ONE}, [*system.q, *system.qd], build)
     momentum = bars[system.nq :]
     gradient = system.kinematics.slopes(bars[: system.nq], momentum, build)
     # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
-    return momentum, along_motion(system, momentum, build, system.qdd), gradient
+    return momentum, along_motion(system, momentum, build, qdd), gradient
 
 
 def chain_rule_literal(system: System) -> LagrangeTerms:

@@ -31,7 +31,8 @@ class Off(NamedTuple):
 
 def off_at(graph: Graph, terms: Graph | None, at: Mapping[str, float], torques: int) -> Off:
     """The count at a state.  graph: the torques.  terms: what each is off by.  torques: how many are off."""
-    state = [name for name in map(_coordinate, graph.input_names) if name]
+    found = [re.fullmatch(r"(qd?\d+)(?:_old)?", name) for name in graph.input_names]
+    state = [each[1] for each in found if each]  # coordinates and velocities, after the step
     of_torques = sum([name.startswith("tau") for name in graph.outputs])
     if terms is None or not torques:
         return Off(0, of_torques, 0, of_torques * len(state))
@@ -40,9 +41,3 @@ def off_at(graph: Graph, terms: Graph | None, at: Mapping[str, float], torques: 
     digits, values = extend.certain_digits(slopes, known), slopes.evaluate(known)
     wrong = [name for name, value in values.items() if value and digits[name] >= 1.0]
     return Off(torques, of_torques, len(wrong), of_torques * len(state))
-
-
-def _coordinate(name: str) -> str:
-    """Name of the coordinate or velocity, after the step, that an input is one of; empty for any other input."""
-    found = re.fullmatch(r"(qd?\d+)(?:_old)?", name)
-    return found[1] if found else ""

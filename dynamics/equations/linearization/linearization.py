@@ -13,7 +13,7 @@ from cgraph import Graph, Node
 from cgraph._shared import Array, kept_by_first, require_choice
 from cgraph.extend import Builder, building, folded
 
-from ...systems.kinematics import ZERO
+from ...systems.kinematics import ZERO, numbered_graph
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import Equation, Output, documented, shortened
@@ -28,6 +28,7 @@ from .momentum_parts import momentum_parts, of_momenta
 # Nodes; beyond, slopes along directions are made in a fraction of the time, and soon are as fast.
 WRITTEN_OUT = 20_000
 FORWARD_SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
+_slopes = kept_by_first(cg.jvp)
 
 
 @Equation("q qd tau", Output("A_{}_{}", ("2n", "2n")), Output("B_{}_{}", ("2n", "n"))).describes
@@ -119,7 +120,7 @@ def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows
     above = np.eye(n if velocity and system.kinematics.quasi is None else 0, 3 * n, n)
     below = range(len(above), 2 * n)
     names = [[*[f"A_{i}_{j}" for j in range(2 * n)], *[f"B_{i}_{j}" for j in range(n)]] for i in below]
-    rows = _numbered_graph(graph.inputs, [graph.outputs[name] for row in names for name in row])
+    rows = numbered_graph(graph.inputs, [graph.outputs[name] for row in names for name in row])
     return LinearRows(rows, graph.input_names, (), above)
 
 
@@ -136,12 +137,8 @@ def _displaced_rates(system: System) -> LinearRows:
             turned = [sum([c * x for c, x in zip(row, xi, strict=True)], ZERO) for row in brackets]
             rates = [u + turn for u, turn in zip(rates, turned, strict=True)]  # xi_dot = dqd + C xi
         inputs, nodes = (*inputs, *xi), folded(nodes, build, at)
-    graph = _numbered_graph(inputs, [*rates, *nodes])
+    graph = numbered_graph(inputs, [*rates, *nodes])
     return LinearRows(graph, equations.input_names, (*xi, *system.qd, *system.tau), none)
-
-
-def _numbered_graph(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
-    return Graph(inputs, {str(k): node for k, node in enumerate(outputs)})
 
 
 def matrices(rows: Array, found: LinearRows) -> tuple[Array, Array]:
@@ -224,12 +221,6 @@ def linearize(
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         _raise_what_is_not_finite(system, state, t, parameters)
     return a, b
-
-
-@kept_by_first
-def _slopes(graph: Graph, wrt: Sequence[Node]) -> Graph:
-    """The graph's change along directions."""
-    return cg.jvp(graph, wrt)
 
 
 def _raise_what_is_not_finite(

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Compiled, Graph
 from cgraph._shared import Array, kept_by_first, require_choice
 
 from ...systems.model import Model, as_system
@@ -16,6 +15,8 @@ from ..equation import documented
 from ..state_equation import FORMS
 from ..states.evaluate import input_rows
 from .linearization import linear_rows, matrices
+
+_machine_code = kept_by_first(cg.compile)
 
 
 @documented
@@ -77,9 +78,3 @@ def linearize_many(
         rows = np.empty((len(values), 2 * n, 3 * n))
         function.batch(values.T, threads, out=rows.reshape(-1, 6 * n * n)[:, found.above.size :].T)
     return matrices(rows, found)
-
-
-@kept_by_first
-def _machine_code(graph: Graph) -> Compiled:
-    """The graph as machine code."""
-    return cg.compile(graph)

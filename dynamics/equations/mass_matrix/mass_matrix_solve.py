@@ -11,6 +11,7 @@ from cgraph.extend import OPS, Builder, SingularError, building, cotangents, fol
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
 from ..constraints.constraints import constraint_rows
+from ..equation import mirrored
 from .singular_mass_matrix import SingularMassMatrixError
 
 DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization loses digits with about their fourth power
@@ -72,9 +73,7 @@ def smaller_solution(system: System, make: Callable[[str], Solution], size: Call
 
 def inverse(solve: MassSolve, build: Builder) -> list[list[Node]]:
     """Rows of M^-1: of the symmetric entries those with fewer operations, where the column is of a later coordinate."""
-    n = len(solve.x)
-    columns = solve.solutions(units(n, len(solve.b)), build)
-    return [[columns[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+    return mirrored(solve.solutions(units(len(solve.x), len(solve.b)), build))
 
 
 def units(count: int, length: int) -> list[list[Node]]:

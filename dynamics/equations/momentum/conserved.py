@@ -104,8 +104,9 @@ def conserved(model: Model) -> Conserved:
 
 def _reasons(form: System, energy_name: str) -> dict[str, list[str]]:
     """{name: why it is not constant}, of momenta and the energy; nothing where it is."""
-    build, names, jumping = Builder(), form.constraints.names, _jumping(form)
+    build, names = Builder(), form.constraints.names
     (lagrangian,) = folded([form.lagrangian], build)
+    jumping = _jumping(form, lagrangian, build)
     momenta = cotangents({lagrangian: ONE}, form.qd, build)
     slopes = folded(momentum_slopes(form, lagrangian, momenta, build), build)
     braking = form.braking(build)
@@ -157,10 +158,8 @@ def _moving_frame(system: System) -> bool:
     return (own.value != 0.0 and not odd[own]) or any([not odd[node] and node not in fixed for node in terms])
 
 
-def _jumping(system: System) -> set[int]:
+def _jumping(system: System, lagrangian: Node, build: Builder) -> set[int]:
     """The velocities along which L jumps, as `floor` and the condition of `where` do: beside a jump its slope is 0."""
-    build = Builder()
-    (lagrangian,) = folded([system.lagrangian], build)
     moving: set[int] = set()
     for node in topological([lagrangian]):
         with building(build):

@@ -123,7 +123,8 @@ class Legendre:
             with building(self.build):
                 good = cg.where(settled, 1.0, good) * cg.less(cg.abs(lagrangian), math.inf)
                 there = _Iterate(velocities, missing, step)
-                here = _Iterate(*[_chosen(good, new, old) for new, old in zip(there, here, strict=True)])
+                pairs = [zip(new, old, strict=True) for new, old in zip(there, here, strict=True)]
+                here = _Iterate(*[[cg.where(good, a, b) for a, b in pair] for pair in pairs])
                 share = cg.where(good, cg.minimum(LONGER_SHARE * share, 1.0), SHORTER_SHARE * share)
         return here.velocities
 
@@ -144,10 +145,6 @@ class _Iterate(NamedTuple):
     velocities: list[Node]
     missing: list[Node]
     step: list[Node]
-
-
-def _chosen(condition: Node, new: list[Node], old: list[Node]) -> list[Node]:
-    return [cg.where(condition, a, b) for a, b in zip(new, old, strict=True)]
 
 
 def is_quadratic(system: System) -> bool:

@@ -45,7 +45,7 @@ def torque_by_link(model: Model) -> TorqueTable:
     build = Builder()
     rows = []
     for partial in folded(system.partial_lagrangians, Builder()):
-        _, rate, gradient = lagrange_sweeps(system, partial, build)  # of Lagrange's equation, by the chain rule
+        _, rate, gradient = lagrange_sweeps(system, partial, build, system.qdd)  # Lagrange's equation by the chain rule
         with building(build):
             rows.append([p_dot - slope for p_dot, slope in zip(rate, gradient, strict=True)])
     names = names_of_partials(system)

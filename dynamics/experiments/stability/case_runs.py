@@ -102,7 +102,6 @@ def changes(case: StabilityCase, run: Trajectory, wanted: set[str]) -> dict[str,
 
 def measurement(criterion: Criterion, values: dict[str, float]) -> Measurement:
     """The measurement of a criterion, relative to its size; NaN where it could not be had."""
-    value, why = values.get(criterion.quantity, math.nan), criterion.why
-    if criterion.quantity.startswith("error"):
-        return Measurement(criterion.quantity, value, criterion.bound, "of size", why)
-    return Measurement(criterion.quantity, value / criterion.scale, criterion.bound, "of scale", why)
+    value, of_size = values.get(criterion.quantity, math.nan), criterion.quantity.startswith("error")
+    scale, unit = (1.0, "of size") if of_size else (criterion.scale, "of scale")
+    return Measurement(criterion.quantity, value / scale, criterion.bound, unit, criterion.why)

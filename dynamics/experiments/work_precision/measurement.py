@@ -48,8 +48,7 @@ class ErrorMetrics:
         """The largest error of a state at each time, (T,), of rows (T, m); infinite where there is no number."""
         with np.errstate(all="ignore"):
             largest = np.max(np.abs(self.exact.deviation(rows)) / self.scales, axis=1)
-        result: Array = np.where(np.isfinite(largest), largest, math.inf)
-        return result
+        return np.where(np.isfinite(largest), largest, math.inf)
 
     def at_end(self, x: Array) -> float:
         """The error of a state (m,) at t_end."""

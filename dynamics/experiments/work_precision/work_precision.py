@@ -5,7 +5,7 @@ import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, astuple, dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -99,10 +99,10 @@ class Target:
     seconds: float
 
 
-def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[Target]:
+def targets(curves: Sequence[Curve]) -> list[Target]:
     """Targets for each error that is met."""
     fastest_runs = []
-    for error in errors:
+    for error in TARGETS:
         met = [(curve.name, point) for curve in curves for point in curve.points if point.error <= error]
         if met:
             name, point = min(met, key=lambda each: each[1].seconds)
@@ -179,31 +179,15 @@ def _fitted(kind: str, points: Sequence[Point]) -> float | None:
     return fitted_order(steps, [each.error for each in told])
 
 
-class Subject(NamedTuple):
-    """A task made ready: the size of its smallest state, its equations, and what measures errors."""
-
-    task: AccuracyTask
-    smallest: float
-    problem: Problem
-    metrics: ErrorMetrics
-
-    @property
-    def title(self) -> str:
-        """Title: the motion, and the error of its reference."""
-        exact, until = self.metrics.exact, f"{self.task.name}, to t = {self.task.t_end:g} s"
-        return f"{until}. Exact motion: {exact.how}; its error {exact.error:.0e}"
-
-
-def subject(task: AccuracyTask, folder: str | Path | None = None, digits: int | None = None) -> Subject:
-    """The task made ready.  folder: where exact motions are kept.  digits: of it (default: the task's).
+def measured(task: AccuracyTask, folder: str | Path | None, digits: int | None) -> tuple[ErrorMetrics, Problem]:
+    """What measures errors of a task, and its equations.  folder: where exact motions are kept.  digits: of it.
 
     Raises ValueError where no exact motion is known.
     """
     exact = task.solution(task.times, folder, digits)
     if exact is None:
         raise ValueError(f"no solution of {task.name!r} is known to compare with")
-    metrics = ErrorMetrics(task, exact)
-    return Subject(task, metrics.smallest, problem_of(task), metrics)
+    return ErrorMetrics(task, exact), problem_of(task)
 
 
 def work_precision(
@@ -228,28 +212,28 @@ def work_precision(
         raise ValueError(f"turns must be at least 1 and limit positive, got {turns!r} and {limit!r} s")
     task, before = load(name, **(options or {})), load_of_machine()
     say(f"{name}: exact motion")
-    readied = spent(lambda: subject(task, folder, digits))
-    at, absent = readied.made, dict[str, str]()
+    readied = spent(lambda: measured(task, folder, digits))
+    (metrics, problem), absent = readied.made, dict[str, str]()
     entries: list[Entry[Ours]] = []
-    for solver in [Ours(method, *at[:3]) for method in METHODS if method in methods]:
+    for solver in [Ours(method, task, metrics.smallest, problem) for method in METHODS if method in methods]:
         say(f"{name}: {solver.name}")
-        entry = sweep(solver, at.metrics, limit)
+        entry = sweep(solver, metrics, limit)
         if entry.tried:
             entries.append(entry)
         else:
             absent[solver.name] = entry.stopped
     say(f"{name}: {turns} turns")
     time_in_turns([tried for entry in entries for tried in entry.tried], turns)
-    curves = tuple([curve(entry, at.metrics) for entry in entries])
+    curves = tuple([curve(entry, metrics) for entry in entries])
     fields = ("name", "about", "t_end", "conservative", "stiff", "left_out")
     return WorkPrecision(
-        **{field: getattr(at.task, field) for field in fields},
-        states=at.problem.size,
-        nodes=len(at.problem.rate.nodes),
-        relative_to="given" if at.task.size else "largest",
-        times=tuple(at.task.times),
-        reference=at.metrics.exact.how,
-        reference_error=at.metrics.exact.error,
+        **{field: getattr(task, field) for field in fields},
+        states=problem.size,
+        nodes=len(problem.rate.nodes),
+        relative_to="given" if task.size else "largest",
+        times=tuple(task.times),
+        reference=metrics.exact.how,
+        reference_error=metrics.exact.error,
         reference_seconds=readied.seconds,
         machine=machine(),
         load=(before, load_of_machine()),

@@ -3,11 +3,11 @@
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph._shared import Array, memo
 from cgraph.extend import Builder, building
 
-from ...systems.kinematics import Kinematics, changes
+from ...systems.kinematics import Kinematics, changes, numbered_graph
 from ...systems.quasi_velocities import QuasiVelocities
 from ..algebra.spatial import cross
 from ..algebra.turns import UNIT
@@ -89,5 +89,5 @@ def _wrong_structure(joint: JointType) -> str:
 
 def _values(nodes: list[Node], inputs: list[Node], at: Array) -> Array:
     """Values of nodes, (len(nodes),), at those of the inputs."""
-    graph = Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})
+    graph = numbered_graph(inputs, nodes)
     return np.array(list(graph.evaluate(dict(zip(graph.input_names, at.tolist(), strict=True))).values()), dtype=float)

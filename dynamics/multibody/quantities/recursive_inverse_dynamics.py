@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Compiled, Graph, Node
+from cgraph import Compiled, Node
 from cgraph._shared import Array, memo, real_array
 from cgraph.extend import Builder, building, cotangents
 
-from ...systems.kinematics import gathered
+from ...systems.kinematics import gathered, numbered_graph
 from ..algebra.spatial import STILL, ZERO, Triple
 from ..algebra.spatial_vectors import Twist
 from ..bodies.joint_coordinates import places
@@ -123,7 +123,7 @@ def _kernels(joint: JointType) -> tuple[Compiled, Compiled]:
 
 
 def _compiled(inputs: Sequence[Node], outputs: Sequence[Node]) -> Compiled:
-    return cg.compile(cg.simplify(Graph(inputs, {f"{k}": node for k, node in enumerate(outputs)})))
+    return cg.compile(cg.simplify(numbered_graph(inputs, outputs)))
 
 
 def _variables(name: str, count: int) -> list[Node]:

@@ -14,13 +14,13 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, Names, building, cotangents, folded
 
-from ...equations.bias_terms import along_motion
 from ...equations.equation import documented
 from ...equations.formulations.lagrange_terms import (
     THROUGH_STEP,
     Embedding,
     formulation_name,
     kinetic_only_exact,
+    lagrange_sweeps,
     through_step,
 )
 from ...equations.torque_parts.torque_decomposition import names_of_partials
@@ -88,7 +88,10 @@ def torque_by_cause(model: Model, formulation: str = "chain_rule") -> TorqueTabl
         mechanism = replace(mechanism, base_parameters=False)
     system = as_system(model if mechanism is None else mechanism)
     build, inputs, of_step = Builder(), [*system.q, *system.qd, *system.qdd], formulation in THROUGH_STEP
-    rows = dict(_of_energies(system, mechanism, build))
+    rows = dict(_potentials(system, mechanism, build))
+    shares = {name: _kinetic(_with(system, partial).kinetic, system, build) for name, partial in _bodies(system)}
+    for place, cause in enumerate(("Coriolis", "inertia")):
+        rows |= {_of(cause, name): share[place] for name, share in shares.items()}
     outside = dict(_of_forces(system, mechanism, build))
     if of_step or formulation == kinetic_only_exact.__name__:
         embedding = Embedding(system)
@@ -100,14 +103,6 @@ def torque_by_cause(model: Model, formulation: str = "chain_rule") -> TorqueTabl
     outputs = {f"tau{i}_{k}": entry for k, row in enumerate(rows.values()) for i, entry in enumerate(row)}
     graph = cg.simplify(system.graph(outputs, inputs))
     return TorqueTable("torque by cause", tuple(rows), system.velocities, system, graph, sum_axis=0)
-
-
-def _of_energies(system: System, mechanism: Mechanism | None, build: Builder) -> Iterator[tuple[str, list[Node]]]:
-    """(name, torques) of each energy of each body: dP/dq, Coriolis forces, inertia."""
-    yield from _potentials(system, mechanism, build)
-    shares = {name: _kinetic(_with(system, partial).kinetic, system, build) for name, partial in _bodies(system)}
-    for place, cause in enumerate(("Coriolis", "inertia")):
-        yield from [(_of(cause, name), share[place]) for name, share in shares.items()]
 
 
 def _bodies(system: System) -> list[tuple[str, Node]]:
@@ -131,10 +126,7 @@ def _kinetic(kinetic: Node, system: System, build: Builder) -> tuple[list[Node],
 
     d/dt dK/dqd - dK/dq: the rate along (q_dot, 0) and t less the slope, and the rate along (0, qdd), M qdd.
     """
-    bars = cotangents({kinetic: ONE}, [*system.q, *system.qd], build)
-    momentum = bars[system.nq :]
-    slopes = system.kinematics.slopes(bars[: system.nq], momentum, build)
-    along = along_motion(system, momentum, build, None)
+    momentum, along, slopes = lagrange_sweeps(system, kinetic, build, None)
     with building(build):
         coriolis = [rate - slope for rate, slope in zip(along, slopes, strict=True)]
     return coriolis, changes(dict(zip(system.qd, system.qdd, strict=True)), momentum, build)
@@ -173,22 +165,14 @@ def _of_forces(system: System, mechanism: Mechanism | None, build: Builder) -> I
     else:
         together: dict[str, list[Force | JointForce | Contact]] = {}
         for force in mechanism.forces:
-            kind = type(force).__name__.removeprefix("Joint").lower()
-            name = (
-                f"{kind} of {', '.join(force.shares)}" if isinstance(force, JointForce) else f"{kind} on {force.body}"
-            )
-            together.setdefault(name, []).append(force)
-        forces = {name: tuple(_along_velocities(mechanism, each)) for name, each in together.items()}
-    for name, given in forces.items():
+            on = f"of {', '.join(force.shares)}" if isinstance(force, JointForce) else f"on {force.body}"
+            together.setdefault(f"{type(force).__name__.removeprefix('Joint').lower()} {on}", []).append(force)
+        given, state = {name: cg.variable(name) for name in mechanism.parameter_values}, (system.q, system.qd)
+        at = mechanism.chain, mechanism.moving, state, given, mechanism.locked
+        forces = {name: tuple(generalized_forces(each, *at)) for name, each in together.items()}
+    for name, nodes in forces.items():
         with building(build):
-            yield name, [-each for each in folded(given, build)]
-
-
-def _along_velocities(mechanism: Mechanism, forces: Sequence[Force | JointForce | Contact]) -> list[Node]:
-    """Some forces of a mechanism as generalized ones."""
-    given = {name: cg.variable(name) for name in mechanism.parameter_values}
-    q, qd = mechanism.system.q, mechanism.system.qd
-    return generalized_forces(forces, mechanism.chain, mechanism.moving, (q, qd), given, mechanism.locked)
+            yield name, [-each for each in folded(nodes, build)]
 
 
 def _of_step(

@@ -137,7 +137,9 @@ def equation_links(
             further = outwards or not in_plane
             known[i] = _best(known[i], known.get(parent), [known[child] for child in children[i]], further)
         if known[i] is not old:
-            result[i] = _link(links[i], known[i], angle)
+            new, at = links[i].with_inertial(known[i].own), known[i]
+            place, angle = spatial.constant(at.place), at.angle + angle  # more than its axes are turned by
+            result[i] = replace(new, turn=at.turn.tolist(), place=place, angle=angle, lift=at.lift)
     return result
 
 
@@ -184,9 +186,3 @@ def _within_quarter(angle: float) -> float:
 
 def _about_z(angle: float) -> Array:
     return spatial.rotation(np.array([0.0, 0.0, 1.0]), angle)
-
-
-def _link(link: Link, to: _Placed, angle: float) -> Link:
-    """The link in other numbers.  angle: more than its axes are turned by."""
-    place, angle = spatial.constant(to.place), to.angle + angle
-    return replace(link.with_inertial(to.own), turn=to.turn.tolist(), place=place, angle=angle, lift=to.lift)

@@ -98,16 +98,14 @@ def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Ca
         merged: dict[str, Body] = {}
         for body in bodies:
             parent = carriers[body.parent]
-            if parent.name == body.parent and body.joint.type.moves:
-                merged[body.name] = body
-                carriers[body.name] = Carrier(body.name, *_OWN)
-                continue
             position = spatial.placed(parent.position, parent.orientation, np.asarray(body.joint.position))
             orientation = spatial.snapped(parent.orientation @ np.asarray(body.joint.orientation))
             if body.joint.type.moves:
-                joint = replace(body.joint, position=position, orientation=orientation)
-                merged[body.name] = replace(body, parent=parent.name, joint=joint)
                 carriers[body.name] = Carrier(body.name, *_OWN)
+                merged[body.name] = body
+                if parent.name != body.parent:
+                    joint = replace(body.joint, position=position, orientation=orientation)
+                    merged[body.name] = replace(body, parent=parent.name, joint=joint)
                 continue
             carriers[body.name] = Carrier(parent.name, position, orientation)
             if parent.name != WORLD and not (vanishes(body.mass) and vanishes(body.inertia)):

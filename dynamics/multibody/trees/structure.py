@@ -271,30 +271,24 @@ class Use(NamedTuple):
 
 def uses(bodies: Sequence[Body], gravity: Quantities, forces: Iterable[AnyForce]) -> Iterator[Use]:
     """The quantities of bodies, their joints, gravity and contacts in which there are parameters."""
-    yield from _of_parameters([("gravity", gravity, quantities)])
+    if names := names_in(entries(gravity)):
+        yield Use("gravity", gravity, names, quantities)
     for force in [each for each in forces if isinstance(each, Contact | JointForce)]:
-        yield from _of_parameters(
-            [(f"{force.label}: {name}", getattr(force, name), check) for name, check in _quantities(force).items()]
-        )
+        yield from _uses_in(force.label, force, _quantities(force))
     for body in bodies:
         yield from _uses_of(body)
 
 
 @kept_by_first
 def _uses_of(body: Body) -> tuple[Use, ...]:
-    tables = (body, BODY_QUANTITIES), (body.joint, JOINT_QUANTITIES)
-    rows = [
-        (f"body {body.name!r}: {name}", getattr(owner, name), check)
-        for owner, table in tables
-        for name, check in table.items()
-    ]
-    return tuple(_of_parameters(rows))
+    where = f"body {body.name!r}"
+    return (*_uses_in(where, body, BODY_QUANTITIES), *_uses_in(where, body.joint, JOINT_QUANTITIES))
 
 
-def _of_parameters(rows: Iterable[tuple[str, object, Callable[[str, object], object]]]) -> Iterator[Use]:
-    for what, value, check in rows:
-        if names := names_in(entries(value)):
-            yield Use(what, value, names, check)
+def _uses_in(where: str, owner: object, checks: Mapping[str, Callable[[str, object], object]]) -> Iterator[Use]:
+    for name, check in checks.items():
+        if names := names_in(entries(value := getattr(owner, name))):
+            yield Use(f"{where}: {name}", value, names, check)
 
 
 def used_names(bodies: Sequence[Body], gravity: Quantities, forces: Sequence[AnyForce]) -> dict[str, None]:

@@ -27,7 +27,6 @@ from ..events.modes import Modes
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import Span, Steps
 from ..stepper import BLOCK_TIME, HELD, ChosenStepper, Stepper, StoppedError, first_registers, span_registers, stepper
-from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import EqualSteps, Numbers, even_steps, instants_of
 from ..steps.state_sizes import Flags
 from ..steps.step_program import StepProgram, compile_steps, step_program
@@ -164,18 +163,14 @@ class LaneRun:
 def _states(program: StepProgram, rows: Array, times: Array) -> Array:
     """States (k, T, m) at times (T,), from the rows (k, T, width) of the steps in which they lie."""
     many, count, width = rows.shape
-    m = program.size
     there = np.where(np.isnan(rows[:, :, 0]), 0, np.arange(count))
     number = np.maximum.accumulate(there, axis=1)  # the row of the step in which a time lies
     rows = rows if count == 1 else np.take_along_axis(rows, number[:, :, None], axis=1)
-    rows, times = rows.reshape(-1, width), np.tile(times, many)
-    t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m].copy()
-    inside = np.flatnonzero(t != times)
+    block, times = program.block(rows.reshape(-1, width)), np.tile(times, many)
+    x, inside = block.x.copy(), np.flatnonzero(block.t != times)
     if len(inside) and program.dense:
-        t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
-        block = StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m), program.normalization)
-        x[inside] = block.states_at(inside, (times[inside] - t_old[inside]) / h[inside])
-    return x.reshape(many, count, m)
+        x[inside] = block.states_at(inside, (times[inside] - block.t_old[inside]) / block.h[inside])
+    return x.reshape(many, count, program.size)
 
 
 class Chunk(NamedTuple):
@@ -199,7 +194,8 @@ class Task:
         *,
         dense: bool,
     ) -> None:
-        self._switched = None if problem.switches is None else problem.portable
+        portable = replace(problem, model=None, system=None)  # type: ignore[arg-type]  # which pickles
+        self._switched = None if problem.switches is None else portable
         dense = dense or problem.switches is not None
         program = self.program = step_program(problem, options.integrator, dense=dense)
         self.options, self.span, self.events, self._many = options, span, events, many

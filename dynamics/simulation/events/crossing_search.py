@@ -97,26 +97,19 @@ class Quantities:
         """The same of the slopes."""
         return enclosure(self.slopes, exact=self._parameters)
 
+    @kept_by_first
     def part(self, number: int) -> Quantities:
         """One of them."""
-        return _part(self, number)
+        name, node = list(self.values.outputs.items())[number]
+        is_resolved = number >= len(self.values.outputs) - self.resolved
+        return Quantities(Graph(self.values.inputs, {name: node}), self.size, int(is_resolved))
 
     @property
     def _parameters(self) -> list[str]:
         return list(self.values.input_names[self.size + 1 :])
 
 
-@kept_by_first
-def quantities(graph: Graph, m: int, resolved: int = 0) -> Quantities:
-    """The quantities of a graph over m states, t and parameters."""
-    return Quantities(graph, m, resolved)
-
-
-@kept_by_first
-def _part(watched: Quantities, number: int) -> Quantities:
-    name, node = list(watched.values.outputs.items())[number]
-    is_resolved = number >= len(watched.values.outputs) - watched.resolved
-    return Quantities(Graph(watched.values.inputs, {name: node}), watched.size, int(is_resolved))
+quantities = kept_by_first(Quantities)
 
 
 class _Batch:
@@ -152,10 +145,8 @@ def _operations(graph: Graph, *, numbers: bool) -> Callable[[Iterable[Any]], lis
     place = {node: k for k, node in enumerate([*leaves, *made])}
     constants = [node.value for node in leaves[len(graph.inputs) :]]
     functions = [node.op.scalar if numbers else node.op.array for node in made]
-    slots, wanted = (
-        [[place[arg] for arg in node.args] for node in made],
-        [place[node] for node in graph.outputs.values()],
-    )
+    slots = [[place[arg] for arg in node.args] for node in made]
+    wanted = [place[node] for node in graph.outputs.values()]
 
     def values(inputs: Iterable[Any]) -> list[Any]:
         known = [*inputs, *constants]

@@ -103,10 +103,11 @@ class Cells(NamedTuple):
         """Subset of the cells."""
         return Cells._make([array[which] for array in self])
 
-    def replaced(self, split: Flags, *halves: Cells) -> Cells:
-        """The cells with left and right parts in place of those of `split`, in order."""
+    def replaced(self, split: Flags, *halves: Cells) -> tuple[Cells, Indices]:
+        """The cells with left and right parts in place of those of `split`, and which of rest and parts they are."""
         cells = Cells._make([np.concatenate(parts) for parts in zip(self.take(~split), *halves, strict=True)])
-        return cells.take(np.lexsort((cells.a, cells.rows)))
+        order = np.lexsort((cells.a, cells.rows))
+        return cells.take(order), order
 
 
 def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
@@ -114,11 +115,8 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
     steps, (steps,), `MOST_CELLS` were too few.
     """
     count, p = len(steps.block.t), np.array(steps.parameters)
-    watched, rows, none = (
-        quantities(steps.event.values, steps.block.x.shape[1]),
-        np.arange(count),
-        np.zeros(count, bool),
-    )
+    watched = quantities(steps.event.values, steps.block.x.shape[1])
+    rows, none = np.arange(count), np.zeros(count, bool)
     g_a, g_b, slope_a, slope_b = [of(rows, none + s) for of in (steps.values, steps.slopes) for s in (0.0, 1.0)]
     cells = Cells(rows, none + 0.0, none + 1.0, g_a, g_b, slope_a, slope_b, none, none.copy())
     done, beyond, new = none.copy(), none.copy(), ~none
@@ -143,14 +141,9 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
         middle = few.a + 0.5 * (few.b - few.a)
         g, slope = steps.values(few.rows, middle), steps.slopes(few.rows, middle)
         halves = few._replace(b=middle, g_b=g, slope_b=slope), few._replace(a=middle, g_a=g, slope_a=slope)
-        marks = np.concatenate([np.zeros(int((~split).sum()), dtype=bool), np.ones(2 * len(middle), dtype=bool)])
-        order = (
-            np.concatenate([cells.rows[~split], few.rows, few.rows]),
-            np.concatenate([cells.a[~split], few.a, middle]),
-        )
-        sorting = np.lexsort((order[1], order[0]))
-        done = np.concatenate([(done | late)[~split], np.zeros(2 * len(middle), dtype=bool)])[sorting]
-        new, cells = marks[sorting], cells.replaced(split, *halves)
+        left = int((~split).sum())
+        cells, order = cells.replaced(split, *halves)
+        new, done = order >= left, np.append((done | late)[~split], np.zeros(2 * len(middle), dtype=bool))[order]
 
 
 def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
@@ -234,7 +227,7 @@ def _at_extrema(steps: WatchedSteps, cells: Cells) -> tuple[Cells, Indices]:
     at, g = np.stack(pair), np.stack([steps.values(few.rows, s) for s in pair])
     nearest = np.argmin(g * sign, axis=0)[None]
     s, value = (np.take_along_axis(table, nearest, axis=0)[0] for table in (at, g))
-    parted = cells.replaced(turns, few._replace(b=s, g_b=value), few._replace(a=s, g_a=value))
+    parted, _ = cells.replaced(turns, few._replace(b=s, g_b=value), few._replace(a=s, g_a=value))
     return parted, np.flatnonzero(turns) + np.arange(1, len(s) + 1)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ from cgraph.extend import Builder
 from ...integrators import Problem
 from ...integrators.rate_in_modes import sliding
 from ...integrators.switches import Switches
-from ...systems.kinematics import changes
+from ...systems.kinematics import changes, numbered_graph
 from ..steps.dense_output import UNIT, Indices, StepBlock
 from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags
@@ -53,7 +54,7 @@ def _drift(problem: Problem, order: int) -> Graph:
     states, rates = problem.rate.inputs[: problem.size], problem.rate.outputs.values()
     seeds = dict(zip(states, rates, strict=True)) | {problem.rate.inputs[problem.size]: cg.constant(1.0)}
     nodes = list(graph.outputs.values())
-    return cg.simplify(Graph(graph.inputs, {f"{k}": dot for k, dot in enumerate(changes(seeds, nodes, Builder()))}))
+    return cg.simplify(numbered_graph(graph.inputs, changes(seeds, nodes, Builder())))
 
 
 @kept_by_first
@@ -72,8 +73,7 @@ class Modes:
         self.turns = list[Turn]()
         self.failed = ""
         self._spacing = np.array(self._switches.spacing)
-        self._signs = frozenset(np.flatnonzero(self._switches.signs).tolist())
-        self._among = self._signs
+        self._among = frozenset(np.flatnonzero(self._switches.signs).tolist())
         self.sizes = np.zeros(problem.size)
         self._fresh = self._left = np.full(len(self.values), np.nan)
         self._at = (np.nan, 0)  # the instant of the last turn, and how many there were at it
@@ -146,7 +146,7 @@ class Modes:
     def touched(self, t: float, x: Array, p: Sequence[float]) -> tuple[int, Array] | None:
         """The margin that is zero to rounding at a state, if one is: what a step does not pass; and the state on it."""
         errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))[:, None]
-        point, (watched, turns) = _points(t, x, p, self.values[:, None]), self._watched
+        point, (watched, turns) = self._point(t, x, p), self._watched
         allowed = outputs_of(_gap_errors(self.plain), np.concatenate([point, errors]))[[k for k, _ in turns], 0]
         near = np.abs(outputs_of(watched.values, point)[:, 0]) <= allowed
         if not near.any() or self.slid.any():
@@ -157,7 +157,7 @@ class Modes:
 
     def nears(self, t: float, x: Array, p: Sequence[float], h: float) -> bool:
         """Whether the motion comes to a surface in two steps of h, by its rate."""
-        point, (watched, _) = _points(t, x, p, self.values[:, None]), self._watched
+        point, (watched, _) = self._point(t, x, p), self._watched
         ways = np.append(outputs_of(self.problem.rate, point)[: len(x), 0], 1.0)[:, None]
         ahead = outputs_of(watched.values, point) + 2.0 * h * outputs_of(watched.slopes, point, ways)
         return bool((ahead <= 0.0).any())
@@ -169,7 +169,11 @@ class Modes:
         return quantities(switches.margins, self.plain.size, switches.ends), switches.turns
 
     def _gaps(self, t: float, x: Array, p: Sequence[float]) -> Array:
-        return outputs_of(self._switches.gaps, _points(t, x, p, self.values[:, None]))[:, 0]
+        return outputs_of(self._switches.gaps, self._point(t, x, p))[:, 0]
+
+    def _point(self, t: float, x: Array, p: Sequence[float]) -> Array:
+        """The inputs of a graph, (.., 1)."""
+        return np.concatenate([x, [t], p, self.values])[:, None]
 
     def _decide(self, t: float, x: Array, p: Sequence[float], crossed: Array, number: int = -1) -> None:
         """What holds from here on, of the surfaces at zero; crossed: those of which the mode has turned."""
@@ -177,7 +181,7 @@ class Modes:
         errors = np.append(AT_ONCE * self.sizes, UNIT * abs(t))
         for _ in range(len(self.values) + 1):  # a mode that has turned may move the surfaces of later ones
             gaps = self._gaps(t, x, p)
-            point = np.append(_points(t, x, p, self.values[:, None])[:, 0], errors)
+            point = np.append(self._point(t, x, p)[:, 0], errors)
             allowed = outputs_of(_gap_errors(self.plain), point[:, None])[:, 0]
             moved = ~(slid | floors | crossed) & (self.values * gaps < -allowed)
             self.values = np.where(moved, -self.values, self.values)
@@ -187,18 +191,11 @@ class Modes:
         zero = (np.abs(gaps - np.where(floors & slid, 0.5, 0.0)) <= allowed) | upper_end | crossed | slid
         self._fresh = np.where(zero, allowed, np.nan)
         if zero.any():
-            among = np.flatnonzero(zero)
-            half = 0.5 * self._spacing[among]
-            middle = np.where(
-                slid[among],
-                self.values[among],
-                self.values[among] - half * np.where(floors[among], 1.0, self.values[among]),
-            )
-            middle = np.where(upper_end[among], self.values[among] + half, middle)
+            among, half = np.flatnonzero(zero), 0.5 * self._spacing
+            middle = np.where(slid, self.values, self.values - half * np.where(floors, 1.0, self.values))
             # a floor that has turned down is at the upper end of its side
-            down = floors[among] & crossed[among] & (gaps[among] > 0.5)
-            middle = np.where(down, self.values[among] + half, middle)
-            found = _Choice(self, t, x, p, among, middle, half, crossed[among]).found()
+            middle = np.where(upper_end | (floors & crossed & (gaps > 0.5)), self.values + half, middle)
+            found = _Choice(self, t, x, p, among, middle[among], half[among], crossed[among]).found()
             if found is None:
                 names = ", ".join([repr(word) for word in dict.fromkeys([self.words[k] for k in among])])
                 self.failed = f"stopped at t = {t:.6g} s: no sides of the surfaces there let the motion go on: {names}"
@@ -212,6 +209,11 @@ class Modes:
     def problem_in(self, modes: Sequence[float]) -> Problem:
         """The problem that holds in some modes."""
         return sliding(self.plain, self._among) if self._slid(modes).any() else self.plain
+
+    def rate(self, modes: Sequence[float]) -> Graph:
+        """The rate in some modes, over all inputs."""
+        rate, known = self.problem_in(modes).rate, dict(zip(self._switches.modes, modes, strict=True))
+        return Graph(rate.inputs, cg.specialize(rate, known).outputs)
 
     def margin(self, turn: Turn, number: int) -> Graph:
         """One of the margins of the problem that holds from a turn on."""
@@ -238,23 +240,19 @@ class Modes:
         return self._switches.words
 
 
+@dataclass(eq=False)
 class _Choice:
     """The choice of sides of surfaces `among` all, (n,), each at middle -+ half, or sliding at middle."""
 
-    def __init__(
-        self,
-        of: Modes,
-        t: float,
-        x: Array,
-        p: Sequence[float],
-        among: Indices,
-        middle: Array,
-        half: Array,
-        crossed: Array,
-    ) -> None:
-        self._of, self._t, self._x, self._p = of, t, x, p
-        self._among, self._middle, self._half, self._crossed = among, middle, half, crossed
-        self._known: dict[tuple[int, ...], tuple[Array, Array]] = {}  # by order, and sides
+    _of: Modes
+    _t: float
+    _x: Array
+    _p: Sequence[float]
+    _among: Indices
+    _middle: Array
+    _half: Array
+    _crossed: Array
+    _known: dict[tuple[int, ...], tuple[Array, Array]] = field(default_factory=dict)  # by order, and sides
 
     def found(self) -> Array | None:
         """Modes that hold; None if none do."""
@@ -263,25 +261,18 @@ class _Choice:
         if n > FEW:
             return self._pivoted(wanted)
         options = [[want, -want, 0] if want else [0, 1, -1] for want in wanted]
-        combinations = sorted(
-            itertools.product(*options),
-            key=lambda each: (
-                sum([side == 0 and want != 0 for side, want in zip(each, wanted, strict=True)]),
-                sum([side != want for side, want in zip(each, wanted, strict=True)]),
-            ),
-        )
-        for each in combinations:
+
+        def changed(sides: Sequence[int]) -> tuple[int, int]:
+            others = [side for side, want in zip(sides, wanted, strict=True) if side != want]
+            return others.count(0), len(others)
+
+        for each in sorted(itertools.product(*options), key=changed):
             if not self._wrong(each):
                 return self._modes(each)
         return None
 
     def _modes(self, sides: Sequence[int]) -> Array:
         return np.asarray(self._middle + self._half * np.array(sides))
-
-    def _modes_at(self, sides: Sequence[int]) -> Array:
-        modes = self._of.values.copy()
-        modes[self._among] = self._modes(sides)
-        return modes
 
     def _derivatives(self, order: int, sides: Sequence[int]) -> tuple[Array, Array]:
         """Derivatives of the gaps by time with these sides, none of which is 0, and what of it is rounding, (n,) each.
@@ -290,15 +281,17 @@ class _Choice:
         """
         key = order, *sides
         if key not in self._known:
-            t, x, sizes = self._t, self._x, self._of.sizes
-            fixed = np.array([*self._p, *self._modes_at(sides)])
+            t, x, sizes, modes = self._t, self._x, self._of.sizes, self._of.values.copy()
+            modes[self._among] = self._modes(sides)
+            fixed = np.array([*self._p, *modes])
             if order == LATER:
                 rate = outputs_of(self._of.plain.rate, np.concatenate([x, [t], fixed])[:, None])[: len(x), 0]
                 moves = (sizes > 0.0) & (rate != 0.0)
                 if moves.any():
                     after = self._of.direction * AHEAD * float(np.median(sizes[moves] / np.abs(rate[moves])))
                     x, t = x + after * rate, t + after
-            ways = np.array([[0.0] * len(x), *_signs(len(x))]).T
+            m = len(x)  # of a state, its components to both sides and in turn
+            ways = np.array([[0.0] * m, [1.0] * m, [1.0 if k % 2 else -1.0 for k in range(m)]]).T
             states = x[:, None] + AT_ONCE * sizes[:, None] * ways
             fixed = np.concatenate([[t], fixed])[:, None]
             points = np.concatenate([states, np.broadcast_to(fixed, (len(fixed), ways.shape[1]))])
@@ -367,17 +360,6 @@ class _Choice:
         return None
 
 
-def _points(t: float, x: Array, p: Sequence[float], modes: Array) -> Array:
-    """Inputs (.., N) of a graph at modes (k, N)."""
-    fixed = np.concatenate([x, [t], p])[:, None]
-    return np.concatenate([np.broadcast_to(fixed, (len(fixed), modes.shape[1])), modes])
-
-
-def _signs(m: int) -> list[list[float]]:
-    """Two patterns of signs."""
-    return [[1.0] * m, [1.0 if k % 2 else -1.0 for k in range(m)]]
-
-
 def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Graph, ...]:
     """Graphs of the state by which others than the first surface are crossed; point: of the inputs of the rate.
 
@@ -397,7 +379,7 @@ def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Grap
         following[k] = after.modes[k]
         alone = [*before.modes]
         alone[k] = after.modes[k]
-        rates = [_rate(modes, each) for each in (before.modes, between, alone, following)]
+        rates = [modes.rate(each) for each in (before.modes, between, alone, following)]
         f, f_between, f_alone, _ = [values_of(rate, point, 1)[:, 0] for rate in rates]
         if not (_moves_alike(margin, point, f, f_between) and _moves_alike(own, point, f, f_alone)):
             names = " and ".join([repr(modes.words[j]) for j in (first[0], k)])
@@ -406,16 +388,6 @@ def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Grap
         result.append(_later(modes.plain, margin, rates[1], rates[3], before.modes))
         between = following
     return tuple(result)
-
-
-def _rate(modes: Modes, values: Sequence[float]) -> Graph:
-    """The rate in these modes, over all inputs."""
-    problem = modes.problem_in(values)
-    switches = problem.switches
-    assert switches is not None
-    return Graph(
-        problem.rate.inputs, cg.specialize(problem.rate, dict(zip(switches.modes, values, strict=True))).outputs
-    )
 
 
 def _slopes(margin: Graph, point: Array, m: int) -> Array:
@@ -456,4 +428,4 @@ def _later(problem: Problem, margin: Graph, between: Graph, after: Graph, modes:
         rate = rate + slope * each
     dt = -g / rate
     moved = [x + (a - b) * dt for x, a, b in zip(inputs, one, two, strict=False)]
-    return cg.simplify(Graph(inputs, {f"{k}": node for k, node in enumerate(moved)}))
+    return cg.simplify(numbered_graph(inputs, moved))

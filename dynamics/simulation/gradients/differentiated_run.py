@@ -9,19 +9,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Array, Tape, kept_by_first, run_passes
+from cgraph._shared import Array, Tape, run_passes
 from cgraph.extend import Runner
 
 from ..outcome import MotionError
 from ..stepper import nonfinite, unsolved
-from ..steps.row_values import values_of
+from ..steps.row_values import tangent, values_of
 from .motion_programs import LOSS, motion_programs, pullback
 from .motions import TORQUE, Arrival, Motions, Stretch
 
@@ -67,10 +66,7 @@ class DifferentiatedRun:
             segment = self._segment(stretch.beginning_at(begin), x, kept)
             self.segments.append(segment)
             begin, x = float(segment.steps.t[-1]), segment.x
-        self._before_end = list[Array]()
-        for graph in self.motions.after:
-            self._before_end.append(x)
-            x = self._state(self.segments[-1].motions, graph, x, begin)
+        *self._before_end, x = self._made(self.segments[-1].motions, motions.after, x, begin)
         self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
         self.loss = np.zeros(motions.many)
         if motions.running is not None:
@@ -79,7 +75,8 @@ class DifferentiatedRun:
     @property
     def end(self) -> Array:
         """The end of the motions in q and qd, (m, N)."""
-        return self._state(self.segments[-1].motions, self.motions.equations.end, self.x, float(self.t[-1]))
+        motions, graph = self.segments[-1].motions, self.motions.equations.end
+        return self._made(motions, [graph] if graph else [], self.x, float(self.t[-1]))[-1]
 
     @property
     def checkpoints(self) -> int:
@@ -89,10 +86,7 @@ class DifferentiatedRun:
     def _segment(self, steps: Stretch, x: Array, every: int) -> Segment:
         """Run steps from the state x on."""
         motions, many, count = self.motions.in_stretch(steps), self.motions.many, len(steps.h)
-        entered = list[Array]()
-        for graph in steps.entry:
-            entered.append(x)
-            x = self._state(motions, graph, x, float(steps.t[0]))
+        *entered, x = self._made(motions, steps.entry, x, float(steps.t[0]))
         before, step, failed = motion_programs(
             motions.equations,
             motions.options.integrator,
@@ -282,7 +276,7 @@ class DifferentiatedRun:
             points = [*x.T[:, :, None], t[:, None], *motions.inputs[:, :, None]]
             moving = [*points, *x_dot.swapaxes(0, 1), t_dot, *dots[m + 1 :]]
             x = values_of(end_graph, points, len(t), 1)[:, :, 0].T
-            x_dot = values_of(_tangent(end_graph), moving, *t_dot.shape).swapaxes(0, 1)
+            x_dot = values_of(tangent(end_graph), moving, *t_dot.shape).swapaxes(0, 1)
         return t, x, t_dot, x_dot
 
     def _along(self, segment: Segment, dots: Array, lengths: Array) -> tuple[Array, Array]:
@@ -327,12 +321,12 @@ class DifferentiatedRun:
 
     def _tangents_at(self, motions: Motions, graph: Graph, x: Array, t: float, dots: Array) -> Array:
         """Tangents (m + 1 + .., k) of the state that a graph makes of x, t and inputs, and of t and inputs."""
-        moved = values_of(_tangent(graph), [*motions.point(x, t), *dots], dots.shape[1])
+        moved = values_of(tangent(graph), [*motions.point(x, t), *dots], dots.shape[1])
         return np.concatenate([moved, dots[len(x) :]])
 
-    def _state(self, motions: Motions, graph: Graph | None, x: Array, t: float) -> Array:
-        """The states (m, N) that a graph over the states, t and parameters makes of some; the same without a graph."""
-        return x if graph is None else _outputs(graph, motions.point(x, t))
+    def _made(self, motions: Motions, graphs: Iterable[Graph], x: Array, t: float) -> list[Array]:
+        """States (m, N), and what graphs over states, t and parameters make of them, one after another."""
+        return [*itertools.accumulate(graphs, lambda x, graph: _outputs(graph, motions.point(x, t)), initial=x)]
 
 
 def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
@@ -346,11 +340,6 @@ def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
         found[:, :, [k]] = run_passes(ready, memory, len(feed), 1, feed)
         memories[:, [k]] = memory
     return found
-
-
-@kept_by_first
-def _tangent(graph: Graph) -> Graph:
-    return cg.jvp(graph)
 
 
 def _outputs(graph: Graph, points: Array) -> Array:

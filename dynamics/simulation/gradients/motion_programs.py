@@ -23,6 +23,7 @@ from ...integrators.rate_in_modes import sliding
 from ...integrators.step import with_registers
 from ...integrators.step_control import equal_registers
 from ...systems.arguments import TIME, new_variables
+from ..steps.row_values import compiled
 from ..steps.step_program import normalizing
 from .rate_pullback import RatePullback, rate_pullback, sharing
 
@@ -126,14 +127,9 @@ def pullback(graph: Graph) -> Graph:
     return cg.simplify(cg.vjp(graph))
 
 
-@kept_by_first
-def _compiled(graph: Graph, backend: str) -> Any:
-    return cg.compile(graph, backend)
-
-
 def outputs_at(graph: Graph, backend: str, x: Array) -> Array:
     """The outputs, (k, N), of a graph that is compiled once, at points (n, N)."""
-    function = _compiled(graph, backend)
+    function: Any = compiled(graph, backend)
     values: Array = function(x[:, 0])[:, None] if x.shape[1] == 1 else function.batch(x)
     return values
 

@@ -188,8 +188,9 @@ class Motions:
         problem, p, rows = self.problem, self.inputs[: len(self.inputs) - self.equations.modes, 0], None
         x = converted(problem.momentum, self.span.t0, self.x[:, 0], p)
         if self.each_step:
-            names = problem.parameters[: self.equations.forces]
-            rows = Hold(_row_controller(self.tau[:, :, 0], self.span), names, problem.nq, self.span.t0)
+            forces, h = self.tau[:, :, 0], self.span.length / len(self.tau)
+            held = SampledController(lambda q, qd, t: forces[min(round(abs(t - self.span.t0) / h), len(forces) - 1)], h)
+            rows = Hold(held, problem.parameters[: self.equations.forces], problem.nq, self.span.t0)
         options = self.options if rows is None else replace(self.options, dt=rows.controller.period)
         run = stepper_of(problem, options, p.tolist(), events=self.events, dense=bool(self.events), control=rows)
         recorder = Recorder(x, self.span)
@@ -272,12 +273,6 @@ def _turn_at(turns: Sequence[Turn], t: float) -> Turn:
     """The turn at an instant: of several the modes after the last, and what was zero at the first."""
     at = [turn for turn in turns if turn.t == t]
     return at[-1]._replace(number=at[0].number)
-
-
-def _row_controller(rows: Array, span: Span) -> SampledController:
-    """The forces of each of equal steps."""
-    h = span.length / len(rows)
-    return SampledController(lambda q, qd, t: rows[min(round(abs(t - span.t0) / h), len(rows) - 1)], h)
 
 
 class Differentiation:

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Array, kept_by_first, real_array
+from cgraph._shared import Array, real_array
 
-from .row_values import converted, values_of
+from .row_values import compiled, converted, tangent, values_of
 
 UNIT = 2.0**-53  # relative error of one rounding
 
@@ -56,8 +55,7 @@ class StepBlock(NamedTuple):
         for coefficients in self.dense[rows].swapaxes(0, 1)[::-1]:
             total += coefficients
             total *= share
-        states: Array = np.where(share == 1.0, self.x[rows], self.x_old[rows] + total)
-        return states
+        return np.where(share == 1.0, self.x[rows], self.x_old[rows] + total)
 
     def _inputs(self, graph: Graph, rows: Indices, s: Array, states: Array) -> list[Array]:
         """The inputs of a normalization: states, and t where it takes it."""
@@ -75,8 +73,7 @@ class StepBlock(NamedTuple):
 
     def times_at(self, rows: Indices, s: Array) -> Array:
         """Times (k,)."""
-        inside: Array = np.where(s == 1.0, self.t[rows], self.t_old[rows] + s * self.h[rows])
-        return inside
+        return np.where(s == 1.0, self.t[rows], self.t_old[rows] + s * self.h[rows])
 
     def slopes_at(self, rows: Indices, s: Array) -> Array:
         """Derivatives of the states by the share, (k, m)."""
@@ -89,7 +86,7 @@ class StepBlock(NamedTuple):
             return total
         inputs = [*self._inputs(graph, rows, s, self.polynomials_at(rows, s)), *total.T]
         with np.errstate(all="ignore"):
-            return values_of(_tangent(graph, self.x.shape[1]), inputs, len(s)).T
+            return values_of(tangent(graph, graph.input_names[: self.x.shape[1]]), inputs, len(s)).T
 
     def rounding(self, rows: Indices, t: Array, x: Array) -> tuple[Array, Array]:
         """Rounding errors, (k, m), of states x (k, m) in these steps, and of the times t (k,)."""
@@ -116,18 +113,6 @@ class StepBlock(NamedTuple):
         return cut
 
 
-@kept_by_first
-def _tangent(graph: Graph, m: int) -> Graph:
-    """Tangents of the outputs, from the inputs and the tangents of the first m."""
-    return cg.jvp(graph, list(graph.input_names[:m]))
-
-
-@kept_by_first
-def _compiled(rate: Graph) -> cg.Compiled:
-    """The rate, for states at many times."""
-    return cg.compile(rate)
-
-
 def inside_nodes(order: int) -> Array:
     """The shares of a step between its ends, (k,), whose states `with_hermite` needs for an error of h^(order + 1)."""
     parts = max(1, order // 2)
@@ -142,7 +127,7 @@ def with_hermite(block: StepBlock, rate: Graph, parameters: Sequence[float], ins
     times[-1] = block.t
     p = np.tile(np.reshape(parameters, (-1, 1)), times.size)
     points = np.concatenate([states.reshape(-1, states.shape[2]).T, times.reshape(1, -1), p])
-    slopes = block.h[:, None] * _compiled(rate).batch(points).T.reshape(states.shape)
+    slopes = block.h[:, None] * compiled(rate).batch(points).T.reshape(states.shape)
     powers = np.arange(1, 2 * len(shares))
     matrix = np.concatenate([shares[1:, None] ** powers, powers * shares[:, None] ** (powers - 1)])
     slopes = np.where(np.isfinite(slopes), slopes, block.x - block.x_old)  # beyond a surface a law may have no value

@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, _shared
-from cgraph._shared import Array
+from cgraph._shared import Array, kept_by_first
 
 BLOCK = 4096  # rows that are taken at once
+
+compiled = kept_by_first(cg.compile)  # by a backend, once
+tangent = kept_by_first(cg.jvp)
 
 
 def values_of(graph: Graph, inputs: Iterable[Any], *shape: int) -> Array:

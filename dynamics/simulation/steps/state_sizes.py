@@ -16,6 +16,7 @@ from cgraph.extend import topological
 
 from ...equations.state_equation import state_inputs
 from ...integrators import Problem
+from ...systems.kinematics import numbered_graph
 from .row_values import values_of
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
@@ -50,7 +51,7 @@ class StateKinds:
         """Largest size among components of one kind, as one of each component's own, (m) to (m)."""
         x, pairs = self._variables, zip(self._variables, self.lengths, strict=True)
         sizes = _largest([abs(value if length == 1.0 else length * value) for value, length in pairs], self.kinds)
-        return _numbered(x, [size / length for size, length in zip(sizes, self.lengths, strict=True)])
+        return numbered_graph(x, [size / length for size, length in zip(sizes, self.lengths, strict=True)])
 
     @cached_property
     def coordinate(self) -> Graph:
@@ -58,13 +59,15 @@ class StateKinds:
         x = self._variables
         weighed = [length * abs(size) for size, length in zip(x, self.lengths, strict=True)]
         largest = {those: reduce(cg.maximum, [weighed[k] for k in those], cg.constant(0.0)) for those in self.moved}
-        return _numbered(x, [largest[those] / length for those, length in zip(self.moved, self.lengths, strict=True)])
+        return numbered_graph(
+            x, [largest[those] / length for those, length in zip(self.moved, self.lengths, strict=True)]
+        )
 
     @cached_property
     def together(self) -> Graph | None:
         """Sizes of components to those of quantities of several, such as a quaternion; None where there are none."""
         x = self._variables
-        return _numbered(x, _largest(x, self.groups)) if len(set(self.groups)) < len(x) else None
+        return numbered_graph(x, _largest(x, self.groups)) if len(set(self.groups)) < len(x) else None
 
     @property
     def _variables(self) -> list[Node]:
@@ -77,10 +80,6 @@ def _largest(values: Sequence[Node], alike: Sequence[int]) -> list[Node]:
     for value, number in zip(values, alike, strict=True):
         found[number] = cg.maximum(found[number], value) if number in found else value
     return [found[number] for number in alike]
-
-
-def _numbered(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
-    return Graph(inputs, {f"y{k}": node for k, node in enumerate(outputs)})
 
 
 def state_kinds(problem: Problem) -> StateKinds:
@@ -123,7 +122,7 @@ def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
             turned[j] = max(turned[j], pushed[k] * kinds.lengths[k] / kinds.lengths[j])
     [time] = cg.variables("time")
     rows = zip(at_once.tolist(), pushed.tolist(), turned.tolist(), strict=True)
-    return replace(kinds, floor=cg.simplify(_numbered([time], [a + time * (b + time * c) for a, b, c in rows])))
+    return replace(kinds, floor=cg.simplify(numbered_graph([time], [a + time * (b + time * c) for a, b, c in rows])))
 
 
 def _rounding(graph: Graph, point: Mapping[str, float], *, rests: bool = True) -> Array | None:

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from cgraph import Graph
-from cgraph._shared import kept_by_first, memo
+from cgraph._shared import Array, kept_by_first, memo
 from cgraph.extend import Call, Factor, If, Program, Runner, Statement, runner
 
 from ...integrators import Method, Problem
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import projected
+from .dense_output import StepBlock
 from .first_step import with_first_step
 from .state_sizes import StateKinds, state_kinds, with_floor
 
@@ -44,6 +45,15 @@ class StepProgram:
     def size(self) -> int:
         """Numbers in a state."""
         return len(self.components)
+
+    def block(self, rows: Array) -> StepBlock:
+        """Rows of chosen steps as these."""
+        m = self.size
+        t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m]
+        if not self.dense:
+            return StepBlock(t, x, t - h, h, np.full_like(x, np.nan), None)
+        t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
+        return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m), self.normalization)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _arrived, (_pickled(self),)

@@ -55,9 +55,9 @@ def test_a_verdict_needs_all_figures_and_the_end_of_the_run() -> None:
 
 
 def test_a_reason_accounts_for_so_much_and_no_more() -> None:
-    (section, case, method), limit = next(iter(limits.LIMITS.items()))
-    assert limits.reason(section, case, method, [measurement(0.9 * limit.within)]) == limit.reason
-    assert limits.reason(section, case, method, [measurement(1.1 * limit.within)]) == ""
+    (section, case, method), (why, within) = next(iter(limits.LIMITS.items()))
+    assert limits.reason(section, case, method, [measurement(0.9 * within)]) == why
+    assert limits.reason(section, case, method, [measurement(1.1 * within)]) == ""
     assert limits.reason(section, case, method, [measurement(math.nan)]) == ""
     assert limits.reason(section, "another case", method, [measurement(2.0)]) == ""
 

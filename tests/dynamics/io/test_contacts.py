@@ -8,7 +8,6 @@ import pytest
 from pytest import approx, raises
 
 import dynamics as dyn
-from dynamics.io.load import load_at_start
 from dynamics.io.mjcf_contacts import _meetings
 from tests.tolerances import EQUATIONS
 
@@ -40,7 +39,7 @@ LEG = """<robot name="leg"><link name="base"/><link name="leg"><inertial><mass v
 LEFT = "contacts (the option contacts takes those of spheres and capsules)"
 
 
-def silently(read: Any, *args: Any, **options: Any) -> dyn.Mechanism:
+def silently(read: Any, *args: Any, **options: Any) -> Any:
     with warnings.catch_warnings(action="ignore", category=dyn.MechanismWarning):
         return read(*args, **options)
 
@@ -158,7 +157,7 @@ def test_spheres_and_capsules_of_a_urdf_stand_on_the_ground() -> None:
     assert [each.radius for each in contacts] == [0.02, 0.02, 0.05]
     run = dyn.simulate(model, [0.6], [0.0], 2.0)
     assert run.q[-1, 0] == approx(0.4 + 0.99 * 0.05, rel=1e-6)
-    _, q = silently(load_at_start, text, floating=True, contacts="compliant")
+    q = silently(dyn.scenes.of_file, text, floating=True, contacts="compliant").q
     assert q == approx((0.0, 0.0, 0.45, 1.0, 0.0, 0.0, 0.0, 0.0))  # the lowest sphere touches
     boxed = silently(dyn.load_urdf, LEG.format(shape='<box size="1 1 1"/>'), contacts="compliant")
     assert boxed.left_out == ("joint limits (slide)", "contacts of shapes other than spheres and capsules (leg: box)")
