@@ -165,7 +165,24 @@ class Graph:
 
         Raises GraphError if the graph has no such input or one is named twice, TypeError for anything else.
         """
-        return self.inputs if wrt is None else _chosen_inputs(self.inputs, wrt)
+        if wrt is None:
+            return self.inputs
+        if not isinstance(wrt, (str, Node, Iterable)):
+            raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
+        inputs, chosen = set(self.inputs), dict[Node, None]()
+        names = ", ".join(self.input_names) or "none"
+        for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
+            node = variable(name) if isinstance(name, str) else name
+            if not isinstance(node, Node):
+                raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
+            if node not in inputs:
+                raise GraphError(f"the graph has no input {node.name or node!r} (it has {names})")
+            if node in chosen:
+                raise GraphError(f"wrt names the input {node.name} twice")
+            chosen[node] = None
+        if not chosen:
+            raise GraphError(f"wrt must name at least one input (the graph has {names})")
+        return tuple(chosen)
 
     def only_output(self) -> Node:
         """The one output. Raises GraphError if there are several."""
@@ -215,15 +232,46 @@ class Graph:
 
     def counts(self) -> Counts:
         """Nodes, edges, depth, width, and nodes by operation, tag and role."""
-        return _counted(self.nodes)
+        level: dict[Node, int] = {}
+        operations, tags, roles = groups = Counter[str](), Counter[str](), Counter[str]()
+        for node in self.nodes:
+            level[node] = 1 + max(level[arg] for arg in node.args) if node.args else 0
+            operations[node.op.name] += 1
+            tags.update(node.tags)
+            roles.update(node.roles)
+        edges, depth = sum([len(node.args) for node in self.nodes]), max(level.values(), default=0)
+        width = max(Counter(level.values()).values(), default=0)
+        return Counts(len(level), edges, depth, width, *map(largest_first, groups))
 
     def listing(self) -> str:
         """The graph as text, a node a line, the same in every run."""
-        return _listing(self.input_names, self.nodes, self.outputs)
+        lines = [f"inputs {' '.join(self.input_names)}"]
+        text: dict[Node, str] = {}
+        for node in self.nodes:
+            if node.op is CONSTANT:
+                text[node] = repr(node.value)
+            elif node.op is VARIABLE:
+                text[node] = str(node.name)
+            else:  # such as `%3 = mul %1 %2  # adjoint; kinetic, link 2`
+                text[node] = f"%{len(lines)}"
+                line = f"{text[node]} = {node.op.name} {' '.join([text[arg] for arg in node.args])}"
+                notes = [", ".join(sorted(labels)) for labels in (node.roles, node.tags) if labels]
+                name = f"  ({node.name})" if node.name else ""
+                lines.append(line + name + (f"  # {'; '.join(notes)}" if notes else ""))
+        lines.extend(f"output {name} = {text[node]}" for name, node in self.outputs.items())
+        return "\n".join(lines) + "\n"
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
-        _check(self.nodes, self.outputs)
+        for node in self.nodes:
+            _check_node(node)
+        if set(topological(self.outputs.values())) != set(self.nodes):
+            raise GraphError("the nodes are not those that the outputs reach")
+        visited: set[Node] = set()
+        for node in self.nodes:
+            if not visited.issuperset(node.args):
+                raise GraphError(f"{node!r} comes before one of its arguments")
+            visited.add(node)
 
     def __repr__(self) -> str:
         ends, edges = map(_short, (self.input_names, tuple(self.outputs))), sum(len(node.args) for node in self.nodes)
@@ -260,77 +308,9 @@ def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
     return nodes
 
 
-def _chosen_inputs(given: Sequence[Node], wrt: str | Node | Sequence[str | Node]) -> tuple[Node, ...]:
-    """Those of a graph's inputs that `wrt` names. Raises as `Graph.select_inputs`."""
-    if not isinstance(wrt, (str, Node, Iterable)):
-        raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
-    inputs, chosen = set(given), dict[Node, None]()
-    names = ", ".join([str(node.name) for node in given]) or "none"
-    for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
-        node = variable(name) if isinstance(name, str) else name
-        if not isinstance(node, Node):
-            raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
-        if node not in inputs:
-            raise GraphError(f"the graph has no input {node.name or node!r} (it has {names})")
-        if node in chosen:
-            raise GraphError(f"wrt names the input {node.name} twice")
-        chosen[node] = None
-    if not chosen:
-        raise GraphError(f"wrt must name at least one input (the graph has {names})")
-    return tuple(chosen)
-
-
-def _counted(nodes: Iterable[Node]) -> Counts:
-    """Counts of nodes in topological order."""
-    level: dict[Node, int] = {}
-    operations: Counter[str] = Counter()
-    tags: Counter[str] = Counter()
-    roles: Counter[str] = Counter()
-    edges = 0
-    for node in nodes:
-        level[node] = 1 + max(level[arg] for arg in node.args) if node.args else 0
-        operations[node.op.name] += 1
-        edges += len(node.args)
-        tags.update(node.tags)
-        roles.update(node.roles)
-    width = max(Counter(level.values()).values(), default=0)
-    return Counts(len(level), edges, max(level.values(), default=0), width, *map(_sorted, (operations, tags, roles)))
-
-
-def _sorted(counter: Counter[str]) -> dict[str, int]:
+def largest_first(counter: Counter[str]) -> dict[str, int]:
+    """The counts, those that are equal by name."""
     return dict(sorted(counter.items(), key=lambda item: (-item[1], item[0])))
-
-
-def _listing(inputs: Sequence[str], nodes: Sequence[Node], outputs: Mapping[str, Node]) -> str:
-    """Text such as `%3 = mul %1 %2  # adjoint; kinetic, link 2`, operations numbered in topological order."""
-    lines = [f"inputs {' '.join(inputs)}"]
-    text: dict[Node, str] = {}
-    for node in nodes:
-        if node.op is CONSTANT:
-            text[node] = repr(node.value)
-        elif node.op is VARIABLE:
-            text[node] = str(node.name)
-        else:
-            text[node] = f"%{len(lines)}"
-            line = f"{text[node]} = {node.op.name} {' '.join([text[arg] for arg in node.args])}"
-            notes = [", ".join(sorted(labels)) for labels in (node.roles, node.tags) if labels]
-            name = f"  ({node.name})" if node.name else ""
-            lines.append(line + name + (f"  # {'; '.join(notes)}" if notes else ""))
-    lines.extend(f"output {name} = {text[node]}" for name, node in outputs.items())
-    return "\n".join(lines) + "\n"
-
-
-def _check(nodes: Sequence[Node], outputs: Mapping[str, Node]) -> None:
-    """Raise GraphError for a graph that no public function could have made."""
-    for node in nodes:
-        _check_node(node)
-    if set(topological(outputs.values())) != set(nodes):
-        raise GraphError("the nodes are not those that the outputs reach")
-    visited: set[Node] = set()
-    for node in nodes:
-        if not visited.issuperset(node.args):
-            raise GraphError(f"{node!r} comes before one of its arguments")
-        visited.add(node)
 
 
 def _check_node(node: Node) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from ..core.checks import GraphError
-from ..core.graph import Graph
+from ..core.graph import Graph, largest_first
 from ..core.html_text import html_lines
 from ..core.node import VARIABLE, Node, variable
 from ..util.json_type import Json
@@ -78,8 +78,7 @@ class Comparison:
         require_choice("side", side, ("left", "right"))
         graph, nodes = (self.left, self.only_left) if side == "left" else (self.right, self.only_right)
         name_of = self.classify(graph)
-        counts = Counter([name_of(node) for node in nodes])
-        return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+        return largest_first(Counter([name_of(node) for node in nodes]))
 
     def __str__(self) -> str:
         sizes = f"{counted(len(self.left.nodes), 'node')} left, {len(self.right.nodes)} right"
