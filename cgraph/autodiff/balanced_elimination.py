@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from heapq import heapify, heappop, heappush
-from typing import NamedTuple
 
 from ..core.builder import Builder
 from ..core.node import Node, as_node, variable
@@ -29,9 +28,8 @@ from .schur_elimination import ONE, EdgePushing
 from .symmetric_elimination import PivotRow
 from .symmetric_matrix import ZERO, SymmetricMatrix
 
-LEAF = (
-    1.85  # variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes
-)
+# Variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes.
+LEAF = 1.85
 NEAR_MIDDLE = 0.2  # of the variables of a piece: how far from its middle a cut may be
 
 
@@ -124,13 +122,6 @@ def _halves(
         yield from _halves(path[cut:], variables, crossing, piece)
 
 
-class Copy(NamedTuple):
-    """Stand-in for a node in other pieces, and the multiplier that holds it there."""
-
-    copy: Node
-    multiplier: Node
-
-
 class BalancedElimination(EdgePushing):
     """EdgePushing in pieces.
 
@@ -155,7 +146,7 @@ class BalancedElimination(EdgePushing):
         variables = [not isinstance(step, list) and (step in self.sums or step in self.position) for step in plan]
         pieces = dissect(later, variables, [len(nodes_of(step)) for step in plan])
         self._piece = {node: pieces[k] for node, k in place.items()}
-        self._copies: dict[Node, Copy] = {}
+        self._copies: dict[Node, tuple[Node, Node]] = {}  # stand-ins in other pieces, and multipliers that hold them
         self._leaving: dict[int, list[Node]] = {}  # the nodes whose copies leave after the step at a place
         self._cut(plan, rows, pieces)
         self._place = place
@@ -180,7 +171,7 @@ class BalancedElimination(EdgePushing):
         for node, whole in within.items():
             if whole is not None:
                 i = len(self._copies)
-                self._copies[node] = Copy(variable(f"copy{i}#"), variable(f"multiplier{i}#"))
+                self._copies[node] = variable(f"copy{i}#"), variable(f"multiplier{i}#")
                 self._leaving.setdefault(whole.last, []).append(node)
         for nodes in self._leaving.values():
             nodes.sort(key=lambda node: -(within[node] or pieces[0]).depth)
@@ -192,9 +183,9 @@ class BalancedElimination(EdgePushing):
 
     def unknown(self, node: Node) -> Node:
         """The node, or its copy where the step at hand is of another piece."""
-        copy = self._copies.get(node)
+        copy, _ = self._copies.get(node, (node, node))
         here = self._piece[node]
-        return node if copy is None or self._here is None or self._here.common(here) is here else copy.copy
+        return node if copy is node or self._here is None or self._here.common(here) is here else copy
 
     def reduce(self, step: EliminationStep) -> None:
         """Take the nodes of a step out, and after it the pairs between pieces that are done."""
