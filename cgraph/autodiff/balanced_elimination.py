@@ -25,8 +25,7 @@ from ..core.builder import Builder
 from ..core.node import Node, as_node, variable
 from .elimination_order import EliminationStep, nodes_of
 from .schur_elimination import ONE, EdgePushing
-from .symmetric_elimination import PivotRow
-from .symmetric_matrix import ZERO, SymmetricMatrix
+from .symmetric_elimination import ZERO, PivotRow, SymmetricMatrix
 
 # Variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes.
 LEAF = 1.85

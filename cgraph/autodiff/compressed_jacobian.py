@@ -12,7 +12,7 @@ from ..simplification.simplify import simplify
 from ..util.require import require_graph
 from .coloring import NONE, Coloring, column_coloring
 from .direction_split import direction_split
-from .jacobian_entries import written_sizes
+from .jacobian import written_sizes
 from .products import jvp
 from .sparsity import pattern
 

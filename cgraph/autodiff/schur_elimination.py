@@ -25,8 +25,7 @@ from ..core.traversal import topological
 from ..util.caches import OPERATIONS, memo
 from .elimination_order import EliminationStep
 from .rotation_pairs import Rotation, rotations
-from .symmetric_elimination import SymmetricElimination
-from .symmetric_matrix import ZERO
+from .symmetric_elimination import ZERO, SymmetricElimination
 
 ONE = as_node(1.0)
 

@@ -18,8 +18,7 @@ from ..util.words import counted
 from ..writing.source_lines import lines_text
 from .edge_partials import Point, edge_slopes
 from .names import Name, Names
-from .paths import best_paths, by_target, path_count
-from .reachability import between
+from .paths import best_paths, between, by_target, path_count
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LONGEST_PATH = 90  # characters up to which a path is written out; a longer one is written by its tags

@@ -15,7 +15,7 @@ from ..core.reverse import cotangents
 from ..util.json_type import Json, json_number
 from ..util.require import require_graph, require_mapping
 from .names import Name, Names, joined
-from .reachability import between
+from .paths import between
 
 SHOWN = 8  # inputs, and operations on the way, that the text has
 

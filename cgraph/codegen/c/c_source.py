@@ -15,10 +15,9 @@ from ...util.words import counted
 from ...writing.structure_hash import structure_hash
 from ..explicit_method import Tableau, checked_methods
 from .c_errors import POINTS, Box, Errors, checked_box, largest_errors
+from .c_functions import comment, declaration, functions, steps
 from .c_identifiers import check_function_name, distinct
 from .c_numbers import NUMBERS, CNumbers
-from .c_statements import comment, functions
-from .c_steps import declaration, steps
 
 _HEADER = """\
 /* {name}: {counts}, written by cgraph. Units are those of the equations behind it. */

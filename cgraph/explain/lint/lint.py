@@ -16,7 +16,7 @@ from ...util.require import require_graph, require_mapping, require_sequence
 from ...util.words import counted
 from ..edge_partials import Point
 from ..names import Name, Names, joined
-from ..reachability import ancestors
+from ..paths import ancestors
 from .cancellation import cancellations, rounded
 from .finding import Finding
 from .independence import Group, check_independence

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...autodiff.coloring import NONE, jacobian_coloring, star_coloring
 from ...autodiff.direction_split import DirectionSplit, direction_split
-from ...autodiff.jacobian_entries import entry_graph, written_sizes
+from ...autodiff.jacobian import entry_graph, written_sizes
 from ...autodiff.products import forward_products, reverse_products
 from ...autodiff.sparsity import Indices, Indices32, Pattern, full, pattern, symmetric
 from ...core.checks import GraphError
