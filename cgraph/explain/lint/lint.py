@@ -236,11 +236,10 @@ def _is_signed(node: Node) -> bool:
 def _unused_inputs(names: Names) -> list[Finding]:
     """The inputs that no output depends on."""
     used = set(names.graph.nodes)
-    unused = [node for node in names.graph.inputs if node not in used]
-    called = {node: names.text(node) for node in unused}
+    unused = {node: names.text(node) for node in names.graph.inputs if node not in used}
     return [
         Finding("unused input", f"Nothing uses the input {name}.", (node,), data={"input": name})
-        for node, name in called.items()
+        for node, name in unused.items()
     ]
 
 
