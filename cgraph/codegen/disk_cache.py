@@ -108,7 +108,9 @@ def default_folder() -> Path:
 def _read(path: Path) -> bytes | None:
     """Content of an entry; None if there is none to trust: whoever writes an entry decides what this process runs."""
     try:
-        with open(path, "rb", opener=_open_at_once) as file:
+        # Without waiting for somebody who writes where the name is a pipe's.
+        at_once = getattr(os, "O_NONBLOCK", 0)
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once)) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_ENTRY or not _ours(status):
                 return None
@@ -116,11 +118,6 @@ def _read(path: Path) -> bytes | None:
     except OSError:
         return None
     return content if checksum == _checksum(path, content) else None
-
-
-def _open_at_once(name: str, flags: int) -> int:
-    """A file descriptor, without waiting for somebody who writes where the name is a pipe's."""
-    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _write(path: Path, content: bytes) -> None:
