@@ -8,7 +8,6 @@ from ..core.builder import Builder, folded
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import Node, Scalar, constant
-from ..core.traversal import rebuild
 from ..util.require import require_graph, require_mapping, require_sequence
 
 
@@ -92,5 +91,4 @@ def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str
             raise GraphError(f"the graph has no output {', '.join(unknown)} (it has {', '.join(graph.outputs)})")
         graph = Graph(graph.inputs, {name: graph.outputs[name] for name in outputs})
     inputs = [node for node in graph.inputs if node not in replace]
-    new = rebuild(graph.outputs.values(), replace, lambda n, args: Node(n.op, args, n.label, name=n.name))
-    return simplify(Graph(inputs, {name: new[node] for name, node in graph.outputs.items()}))
+    return simplify(Graph(inputs, graph(*[replace.get(node, node) for node in graph.inputs])))

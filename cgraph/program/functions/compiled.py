@@ -223,8 +223,7 @@ class Compiled(BoundFunction):
         >>> cg.compile(cg.Graph([x], {"y": x * x})).jacobian([[1.0], [2.0], [3.0]]).ravel().tolist()
         [2.0, 4.0, 6.0]
         """
-        chosen = None if wrt is None else self._chosen(wrt)
-        return self._matrix(self._derivatives.jacobian(chosen), self._points(x), sparse, threads)
+        return self._matrix(self._derivatives.jacobian(self._chosen(wrt)), self._points(x), sparse, threads)
 
     def hessian(
         self,
@@ -325,8 +324,7 @@ class Compiled(BoundFunction):
     def _products(
         self, x: ArrayLike, name: str, directions: ArrayLike, wrt: Inputs, threads: int | None, *, reverse: bool
     ) -> Array:
-        points, rows = self._points(x), real_array(name, directions)
-        chosen = None if wrt is None else self._chosen(wrt)
+        points, rows, chosen = self._points(x), real_array(name, directions), self._chosen(wrt)
         width, found = self.n_in if chosen is None else len(chosen), self.n_out
         if reverse:
             width, found = found, width
