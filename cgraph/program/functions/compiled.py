@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from ...codegen.bound_call import bound
 from ...codegen.c_entry import CEntry, c_entry
-from ...codegen.disk_cache import open_cache
+from ...codegen.disk_cache import cache_folder
 from ...codegen.llvm_engine import MissingFunctionError
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
@@ -452,7 +452,7 @@ def compile(
         )
     if backend == "llvm" or (backend == "auto" and not large):
         try:
-            ready = partial(NativeRunner, fast=fast, fma=fma, cache=open_cache(kept))
+            ready = partial(NativeRunner, fast=fast, fma=fma, cache=cache_folder(kept))
             return Compiled(graph, backend, options, ready, ready)
         except (ImportError, MissingFunctionError):
             if backend == "llvm":
