@@ -79,24 +79,20 @@ class Counts:
     by_role: dict[str, int]
 
     def __str__(self) -> str:
-        def row(title: str, counts: dict[str, int]) -> str:
+        lines = [f"nodes {self.nodes}, edges {self.edges}, depth {self.depth}, width {self.width}"]
+        for group, counts in self._groups.items():
             listed = ", ".join(f"{name} {n}" for name, n in counts.items())
-            return f"{title:13}{listed or '-'}"
-
-        return "\n".join(
-            (
-                f"nodes {self.nodes}, edges {self.edges}, depth {self.depth}, width {self.width}",
-                row("by operation", self.by_operation),
-                row("by tag", self.by_tag),
-                row("by role", self.by_role),
-            )
-        )
+            lines.append(f"{f'by {group}':13}{listed or '-'}")
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         sizes = [(name, str(getattr(self, name))) for name in ("nodes", "edges", "depth", "width")]
-        groups = {"operation": self.by_operation, "tag": self.by_tag, "role": self.by_role}
-        rows = [(f"{kind} {name}", str(n)) for kind, counts in groups.items() for name, n in counts.items()]
+        rows = [(f"{group} {name}", str(n)) for group, counts in self._groups.items() for name, n in counts.items()]
         return html_table(("", "count"), sizes + rows)
+
+    @property
+    def _groups(self) -> dict[str, dict[str, int]]:
+        return {"operation": self.by_operation, "tag": self.by_tag, "role": self.by_role}
 
 
 class Graph:
@@ -141,7 +137,13 @@ class Graph:
     nodes: tuple[Node, ...]
 
     def __init__(self, inputs: Sequence[Node], outputs: Mapping[str, Scalar]) -> None:
-        self.inputs = _checked_inputs(inputs)
+        if isinstance(inputs, Node) or not isinstance(inputs, Iterable):
+            raise TypeError(f"inputs must be a sequence of variables, got {inputs!r:.60}; write [x]")
+        self.inputs = tuple(inputs)
+        if wrong := [node for node in self.inputs if not isinstance(node, Node) or node.op is not VARIABLE]:
+            raise TypeError(f"an input must be a variable, got {wrong[0]!r:.60}")
+        if twice := [name for name, count in Counter([node.name for node in self.inputs]).items() if count > 1]:
+            raise GraphError(f"input {twice[0]!r} is listed more than once")
         self.outputs = _checked_outputs(outputs)
         self.nodes = tuple(topological(self.outputs.values()))
         known = set(self.inputs)
@@ -280,17 +282,6 @@ class Graph:
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
         return render_html("graph", self)
-
-
-def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
-    if isinstance(inputs, Node) or not isinstance(inputs, Iterable):
-        raise TypeError(f"inputs must be a sequence of variables, got {inputs!r:.60}; write [x]")
-    nodes = tuple(inputs)
-    if wrong := [node for node in nodes if not isinstance(node, Node) or node.op is not VARIABLE]:
-        raise TypeError(f"an input must be a variable, got {wrong[0]!r:.60}")
-    if twice := [name for name, count in Counter([node.name for node in nodes]).items() if count > 1]:
-        raise GraphError(f"input {twice[0]!r} is listed more than once")
-    return nodes
 
 
 def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
