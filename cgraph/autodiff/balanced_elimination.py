@@ -125,6 +125,7 @@ class BalancedElimination(EdgePushing):
     """EdgePushing in pieces.
 
     plan: the steps.  rows: the unknowns that each step leaves entries with, see `written_rows`.
+    copies: {node: its stand-in in other pieces, and the multiplier that holds it there}.
     """
 
     def __init__(
@@ -145,18 +146,13 @@ class BalancedElimination(EdgePushing):
         variables = [not isinstance(step, list) and (step in self.sums or step in self.position) for step in plan]
         pieces = dissect(later, variables, [len(nodes_of(step)) for step in plan])
         self._piece = {node: pieces[k] for node, k in place.items()}
-        self._copies: dict[Node, tuple[Node, Node]] = {}  # stand-ins in other pieces, and multipliers that hold them
+        self.copies: dict[Node, tuple[Node, Node]] = {}
         self._leaving: dict[int, list[Node]] = {}  # the nodes whose copies leave after the step at a place
         self._cut(plan, rows, pieces)
         self._place = place
         self._here = pieces[0] if pieces else None
         self._after: dict[int, list[Node]] = {}  # what left after the step at a place
         self._depths: dict[Node, int] = {}
-
-    @property
-    def is_cut(self) -> bool:
-        """Whether there is more than one piece."""
-        return bool(self._copies)
 
     def _cut(self, plan: Sequence[EliminationStep], rows: Sequence[Collection[Node]], pieces: Sequence[Piece]) -> None:
         """Copies of the nodes that steps of other pieces pass to, and where they leave."""
@@ -169,8 +165,8 @@ class BalancedElimination(EdgePushing):
                     within[node] = wider and wider.common(piece)
         for node, whole in within.items():
             if whole is not None:
-                i = len(self._copies)
-                self._copies[node] = variable(f"copy{i}#"), variable(f"multiplier{i}#")
+                i = len(self.copies)
+                self.copies[node] = variable(f"copy{i}#"), variable(f"multiplier{i}#")
                 self._leaving.setdefault(whole.last, []).append(node)
         for nodes in self._leaving.values():
             nodes.sort(key=lambda node: -(within[node] or pieces[0]).depth)
@@ -182,7 +178,7 @@ class BalancedElimination(EdgePushing):
 
     def unknown(self, node: Node) -> Node:
         """The node, or its copy where the step at hand is of another piece."""
-        copy, _ = self._copies.get(node, (node, node))
+        copy, _ = self.copies.get(node, (node, node))
         here = self._piece[node]
         return node if copy is node or self._here is None or self._here.common(here) is here else copy
 
@@ -191,14 +187,14 @@ class BalancedElimination(EdgePushing):
         nodes = nodes_of(step)
         self._here, k = self._piece[nodes[0]], self._place[nodes[0]]
         for node in nodes:
-            if node in self._copies:
-                copy, multiplier = self._copies[node]
+            if node in self.copies:
+                copy, multiplier = self.copies[node]
                 self.matrix.add(node, multiplier, as_node(-1.0))  # t_copy - t_node = 0, the multiplier's row
                 self.matrix.add(copy, multiplier, ONE)
         super().reduce(step)
         before = len(self.pivot_rows)
         for node in self._leaving.get(k, ()):
-            self.eliminate_tied(*self._copies[node])
+            self.eliminate_tied(*self.copies[node])
             self.retry()
         self._after[k] = list(self.pivot_rows)[before:]
 
@@ -249,7 +245,7 @@ class BalancedElimination(EdgePushing):
 
     def info(self, negative: Collection[Node] = ()) -> Node:
         """Info as of the base class; a pair that has not one positive eigenvalue counts as the variable before it."""
-        return super().info({*negative, *[unknown for pair in self._copies.values() for unknown in pair]})
+        return super().info({*negative, *[unknown for pair in self.copies.values() for unknown in pair]})
 
     def depth_of(self, solved: EdgePushing, wrt: Sequence[Node]) -> int:
         """Depth of the solution of some equations."""

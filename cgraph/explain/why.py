@@ -235,8 +235,7 @@ def _contributing(
 
     What lies behind a zero, such as the branch that `where` does not take, may have no derivative: zero wins.
     """
-    live = {sink}
-    kept = []
+    live, kept = {sink}, set[Edge]()
     incoming = by_target(edges)
     for node in reversed(nodes):
         for edge in incoming.get(node, ()) if node in live else ():
@@ -246,9 +245,8 @@ def _contributing(
             if not math.isfinite(slope):
                 raise GraphError(f"the derivative of {names.line(node)} by {names.text(edge.source)} is {slope} here")
             live.add(edge.source)
-            kept.append(edge)
-    chosen = set(kept)
-    return [edge for edge in edges if edge in chosen]
+            kept.add(edge)
+    return [edge for edge in edges if edge in kept]
 
 
 def _path_sums(
