@@ -1,4 +1,4 @@
-"""Whole derivatives: the Jacobian of a graph, entries of a sparse one, and the Hessian of a graph with one output."""
+"""Whole derivatives: the Jacobian of a graph, and the Hessian of a graph with one output."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from ..core.node import Node, as_node
 from ..core.reverse import cotangents
 from ..util.explain_failure import explain_failure
 from ..util.require import require_graph
-from .sparsity import Pattern, dependence, slopes
 
 
 def jacobian(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Graph:
@@ -123,40 +122,3 @@ def hessian_nodes(output: Node, wrt: Sequence[Node], build: Builder | None = Non
     first = cotangents({output: one}, wrt, build)
     columns = [tangents({node: one}, first[j:], build) for j, node in enumerate(wrt)]
     return [[columns[j].get(first[i], zero) for j in range(i + 1)] for i in range(len(wrt))]
-
-
-def written_sizes(graph: Graph, wrt: Sequence[Node]) -> tuple[int, int, int]:
-    """Operations to differentiate: once, in all sweeps over columns, and in all sweeps over rows."""
-    once = columns = rows = 0
-    active: set[Node] = set()
-    for node, bits in dependence(graph, wrt):
-        if bits and node.args:
-            active.add(node)
-            once, columns = once + 1, columns + bits.bit_count()
-    reached: dict[Node, int] = {}
-    for i, node in enumerate(graph.outputs.values()):
-        reached[node] = reached.get(node, 0) | 1 << i
-    for node in reversed(graph.nodes):
-        bits = reached.pop(node, 0)
-        if bits and node in active:
-            rows += bits.bit_count()
-            for arg in slopes(node):
-                reached[arg] = reached.get(arg, 0) | bits
-    return once, columns, rows
-
-
-def entry_graph(graph: Graph, wrt: Sequence[Node], entries: Pattern, by_row: bool) -> Graph:
-    """x -> the entries of the Jacobian by `wrt`, in their order: a sweep a row or a column, over what it reaches."""
-    zero, one, build = as_node(0.0), as_node(1.0), Builder()
-    outputs = list(graph.outputs.values())
-    values: dict[tuple[int, int], Node] = {}
-    if by_row:
-        for i, row in enumerate(entries.by_row()):
-            bars = cotangents({outputs[i]: one}, [wrt[j] for j in row], build) if row else []
-            values |= {(i, j): bar for j, bar in zip(row, bars, strict=True)}
-    else:
-        for j, column in enumerate(entries.by_column()):
-            dots = tangents({wrt[j]: one}, [outputs[i] for i in column], build)
-            values |= {(i, j): dots.get(outputs[i], zero) for i in column}
-    order = zip(entries.rows.tolist(), entries.columns.tolist(), strict=True)
-    return Graph(graph.inputs, {f"e{k}": values[place] for k, place in enumerate(order)})

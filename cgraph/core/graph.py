@@ -266,7 +266,21 @@ class Graph:
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
         for node in self.nodes:
-            _check_node(node)
+            if not isinstance(node, Node) or not isinstance(node.op, Row):
+                raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
+            if node.op is CONSTANT:
+                if type(node.value) is not float or node.value != node.value:
+                    raise GraphError(f"constant {node.value!r} is not a number")
+            elif node.op is VARIABLE:
+                if not node.name:
+                    raise GraphError("a variable has no name")
+            elif ROWS.get(node.op.name) is not node.op:
+                raise GraphError(f"operation {node.op.name!r} is not in the table")
+            if len(node.args) != node.op.arity:
+                raise GraphError(f"{node.op.name} takes {node.op.arity} argument(s), a node has {len(node.args)}")
+            for arg in node.args:
+                if not isinstance(arg, Node):
+                    raise GraphError(f"an argument of {node!r} is not a node: {arg!r:.60}")
         if set(topological(self.outputs.values())) != set(self.nodes):
             raise GraphError("the nodes are not those that the outputs reach")
         visited: set[Node] = set()
@@ -302,25 +316,6 @@ def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
 def largest_first(counter: Counter[str]) -> dict[str, int]:
     """The counts, those that are equal by name."""
     return dict(sorted(counter.items(), key=lambda item: (-item[1], item[0])))
-
-
-def _check_node(node: Node) -> None:
-    """Raise GraphError unless the node is well formed."""
-    if not isinstance(node, Node) or not isinstance(node.op, Row):
-        raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
-    if node.op is CONSTANT:
-        if type(node.value) is not float or node.value != node.value:
-            raise GraphError(f"constant {node.value!r} is not a number")
-    elif node.op is VARIABLE:
-        if not node.name:
-            raise GraphError("a variable has no name")
-    elif ROWS.get(node.op.name) is not node.op:
-        raise GraphError(f"operation {node.op.name!r} is not in the table")
-    if len(node.args) != node.op.arity:
-        raise GraphError(f"{node.op.name} takes {node.op.arity} argument(s), a node has {len(node.args)}")
-    for arg in node.args:
-        if not isinstance(arg, Node):
-            raise GraphError(f"an argument of {node!r} is not a node: {arg!r:.60}")
 
 
 def _short(names: Sequence[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -84,10 +84,9 @@ class Comparison:
         sizes = f"{counted(len(self.left.nodes), 'node')} left, {len(self.right.nodes)} right"
         only = f"{len(self.only_left)} only left, {len(self.only_right)} only right"
         lines = [f"{sizes}: {len(self.common)} in both, {only}."]
-        if self.same_outputs:
-            lines.append(f"Computed alike: {joined(self._shown(self.same_outputs))}.")
-        if self.other_outputs:
-            lines.append(f"Computed otherwise: {joined(self._shown(self.other_outputs))}.")
+        for how, outputs in (("alike", self.same_outputs), ("otherwise", self.other_outputs)):
+            if outputs:
+                lines.append(f"Computed {how}: {joined([self.names.get(name, name) for name in outputs])}.")
         sides: tuple[Side, Side] = ("left", "right")
         for side in sides:
             if rows := list(self.classes(side).items()):
@@ -96,9 +95,6 @@ class Comparison:
                 if rest := rows[_SHOWN:]:
                     lines.append(f"  {sum([number for _, number in rest]):>5}  in {len(rest)} more classes")
         return "\n".join(lines)
-
-    def _shown(self, outputs: Sequence[str]) -> list[str]:
-        return [self.names.get(name, name) for name in outputs]
 
     def _repr_html_(self) -> str:
         return html_lines(str(self))

@@ -298,14 +298,11 @@ def _route(names: Names, nodes: Sequence[Node]) -> list[str]:
 
 def _told_apart(names: Names, paths: Sequence[Path]) -> list[Path]:
     """The paths; of those that read the same, with all their sums, and by which argument each operation is reached."""
-    times = Counter([path.text for path in paths])
-    return [
-        replace(path, text=f"{path.text}  ({_edges(names, path)})") if times[path.text] > 1 else path for path in paths
-    ]
-
-
-def _edges(names: Names, path: Path) -> str:
-    return " ".join([f"%{names.number[edge.target]}.{edge.slot + 1}" for edge in path.edges])
+    times, result = Counter([path.text for path in paths]), []
+    for path in paths:
+        edges = " ".join([f"%{names.number[edge.target]}.{edge.slot + 1}" for edge in path.edges])
+        result.append(replace(path, text=f"{path.text}  ({edges})") if times[path.text] > 1 else path)
+    return result
 
 
 def digits_of(count: int) -> str:

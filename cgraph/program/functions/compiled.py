@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...codegen.bound_call import bound
-from ...codegen.c_entry import CEntry, c_entry
+from ...codegen.bound_call import CEntry, bound, c_entry
 from ...codegen.disk_cache import cache_folder
 from ...codegen.llvm_engine import MissingFunctionError
 from ...core.checks import GraphError
