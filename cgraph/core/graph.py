@@ -144,7 +144,17 @@ class Graph:
             raise TypeError(f"an input must be a variable, got {wrong[0]!r:.60}")
         if twice := [name for name, count in Counter([node.name for node in self.inputs]).items() if count > 1]:
             raise GraphError(f"input {twice[0]!r} is listed more than once")
-        self.outputs = _checked_outputs(outputs)
+        if not isinstance(outputs, Mapping):
+            raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
+        if not outputs:
+            raise GraphError("a graph needs at least one output")
+        self.outputs = {}
+        for name, value in outputs.items():
+            name = check_name("an output", name)
+            try:
+                self.outputs[name] = as_node(value)
+            except TypeError as error:
+                raise TypeError(f"output {name!r}: {error}") from None
         self.nodes = tuple(topological(self.outputs.values()))
         known = set(self.inputs)
         if free := [node.name for node in self.nodes if node.op is VARIABLE and node not in known]:
@@ -296,21 +306,6 @@ class Graph:
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
         return render_html("graph", self)
-
-
-def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
-    if not isinstance(outputs, Mapping):
-        raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
-    if not outputs:
-        raise GraphError("a graph needs at least one output")
-    nodes = {}
-    for name, value in outputs.items():
-        name = check_name("an output", name)
-        try:
-            nodes[name] = as_node(value)
-        except TypeError as error:
-            raise TypeError(f"output {name!r}: {error}") from None
-    return nodes
 
 
 def largest_first(counter: Counter[str]) -> dict[str, int]:

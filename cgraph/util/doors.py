@@ -61,19 +61,26 @@ def doors(
     return load, lambda: sorted({*vars(sys.modules[package]), *names()})
 
 
-def moved_methods(kind: type, package: str, names: Collection[str], alone: Collection[str] = ()) -> None:
-    """Keep methods of a class that are functions of a package now, which warn.  alone: those that took no object."""
+class MovedMethod:
+    """A method whose place a function of the package has taken, which it calls with a warning."""
 
-    def moved(name: str) -> Callable[..., object]:
+    def __init__(self, package: str, name: str, alone: bool) -> None:
+        self.package, self.name, self.alone = package, name, alone
+
+    def __get__(self, owner: object, kind: type) -> Callable[..., object]:
         def call(*args: object, **named: object) -> object:
-            text = f"{kind.__name__}.{name} goes with the next version: call {package}.{name}"
+            text = f"{kind.__name__}.{self.name} goes with the next version: call {self.package}.{self.name}"
             warnings.warn(text, DeprecationWarning, stacklevel=2)
-            return getattr(sys.modules[package], name)(*args, **named)
+            function = getattr(sys.modules[self.package], self.name)
+            return function(*args if owner is None or self.alone else (owner, *args), **named)
 
         return call
 
+
+def moved_methods(kind: type, package: str, names: Collection[str], alone: Collection[str] = ()) -> None:
+    """Keep methods of a class that are functions of a package now.  alone: those that took no object."""
     for name in names:
-        setattr(kind, name, staticmethod(moved(name)) if name in alone else moved(name))
+        setattr(kind, name, MovedMethod(package, name, name in alone))
 
 
 def _homes(file: str) -> Homes:
