@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from .autodiff.compressed_jacobian import CompressedJacobian as CompressedJacobian
     from .autodiff.hessian_solve import Order as Order, solve_tangents as solve_tangents
     from .autodiff.jets import Jets as Jets
-    from .autodiff.ldl_solve import ldl_solve as ldl_solve
+    from .autodiff.symmetric_elimination import ldl_solve as ldl_solve
     from .bridges.translation import Operations as Operations, operations as operations
     from .core.checks import check_name as check_name
     from .core.evaluation import (
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .core.label import SMOOTH as SMOOTH, UNLABELLED as UNLABELLED
     from .core.scope import formulating as formulating, without_collection as without_collection
     from .explain.lint.lint import Lint as Lint
-    from .explain.reachability import descendants as descendants
+    from .explain.paths import descendants as descendants
     from .explain.why_nan import WhyNan as WhyNan
     from .operations.bounds import intervals as intervals
     from .operations.operation import columns as columns

@@ -79,7 +79,7 @@ if TYPE_CHECKING:
     from .program.statements.call import Call as Call, Map as Map, Sum as Sum, added as added, copied as copied
     from .program.statements.control import FixedPoint as FixedPoint, If as If, While as While
     from .program.statements.matrix import Factor as Factor, Solve as Solve
-    from .simplification.reciprocals import with_reciprocals as with_reciprocals
+    from .simplification.simplify import with_reciprocals as with_reciprocals
     from .writing.formulas import Formulas as Formulas, Notation as Notation
 
 

@@ -20,18 +20,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from heapq import heapify, heappop, heappush
-from typing import NamedTuple
 
 from ..core.builder import Builder
 from ..core.node import Node, as_node, variable
 from .elimination_order import EliminationStep, nodes_of
 from .schur_elimination import ONE, EdgePushing
-from .symmetric_elimination import PivotRow
-from .symmetric_matrix import ZERO, SymmetricMatrix
+from .symmetric_elimination import ZERO, PivotRow, SymmetricMatrix
 
-LEAF = (
-    1.85  # variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes
-)
+# Variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes.
+LEAF = 1.85
 NEAR_MIDDLE = 0.2  # of the variables of a piece: how far from its middle a cut may be
 
 
@@ -124,17 +121,11 @@ def _halves(
         yield from _halves(path[cut:], variables, crossing, piece)
 
 
-class Copy(NamedTuple):
-    """Stand-in for a node in other pieces, and the multiplier that holds it there."""
-
-    copy: Node
-    multiplier: Node
-
-
 class BalancedElimination(EdgePushing):
     """EdgePushing in pieces.
 
     plan: the steps.  rows: the unknowns that each step leaves entries with, see `written_rows`.
+    copies: {node: its stand-in in other pieces, and the multiplier that holds it there}.
     """
 
     def __init__(
@@ -155,18 +146,13 @@ class BalancedElimination(EdgePushing):
         variables = [not isinstance(step, list) and (step in self.sums or step in self.position) for step in plan]
         pieces = dissect(later, variables, [len(nodes_of(step)) for step in plan])
         self._piece = {node: pieces[k] for node, k in place.items()}
-        self._copies: dict[Node, Copy] = {}
+        self.copies: dict[Node, tuple[Node, Node]] = {}
         self._leaving: dict[int, list[Node]] = {}  # the nodes whose copies leave after the step at a place
         self._cut(plan, rows, pieces)
         self._place = place
         self._here = pieces[0] if pieces else None
         self._after: dict[int, list[Node]] = {}  # what left after the step at a place
         self._depths: dict[Node, int] = {}
-
-    @property
-    def is_cut(self) -> bool:
-        """Whether there is more than one piece."""
-        return bool(self._copies)
 
     def _cut(self, plan: Sequence[EliminationStep], rows: Sequence[Collection[Node]], pieces: Sequence[Piece]) -> None:
         """Copies of the nodes that steps of other pieces pass to, and where they leave."""
@@ -179,8 +165,8 @@ class BalancedElimination(EdgePushing):
                     within[node] = wider and wider.common(piece)
         for node, whole in within.items():
             if whole is not None:
-                i = len(self._copies)
-                self._copies[node] = Copy(variable(f"copy{i}#"), variable(f"multiplier{i}#"))
+                i = len(self.copies)
+                self.copies[node] = variable(f"copy{i}#"), variable(f"multiplier{i}#")
                 self._leaving.setdefault(whole.last, []).append(node)
         for nodes in self._leaving.values():
             nodes.sort(key=lambda node: -(within[node] or pieces[0]).depth)
@@ -192,23 +178,23 @@ class BalancedElimination(EdgePushing):
 
     def unknown(self, node: Node) -> Node:
         """The node, or its copy where the step at hand is of another piece."""
-        copy = self._copies.get(node)
+        copy, _ = self.copies.get(node, (node, node))
         here = self._piece[node]
-        return node if copy is None or self._here is None or self._here.common(here) is here else copy.copy
+        return node if copy is node or self._here is None or self._here.common(here) is here else copy
 
     def reduce(self, step: EliminationStep) -> None:
         """Take the nodes of a step out, and after it the pairs between pieces that are done."""
         nodes = nodes_of(step)
         self._here, k = self._piece[nodes[0]], self._place[nodes[0]]
         for node in nodes:
-            if node in self._copies:
-                copy, multiplier = self._copies[node]
+            if node in self.copies:
+                copy, multiplier = self.copies[node]
                 self.matrix.add(node, multiplier, as_node(-1.0))  # t_copy - t_node = 0, the multiplier's row
                 self.matrix.add(copy, multiplier, ONE)
         super().reduce(step)
         before = len(self.pivot_rows)
         for node in self._leaving.get(k, ()):
-            self.eliminate_tied(*self._copies[node])
+            self.eliminate_tied(*self.copies[node])
             self.retry()
         self._after[k] = list(self.pivot_rows)[before:]
 
@@ -259,7 +245,7 @@ class BalancedElimination(EdgePushing):
 
     def info(self, negative: Collection[Node] = ()) -> Node:
         """Info as of the base class; a pair that has not one positive eigenvalue counts as the variable before it."""
-        return super().info({*negative, *[unknown for pair in self._copies.values() for unknown in pair]})
+        return super().info({*negative, *[unknown for pair in self.copies.values() for unknown in pair]})
 
     def depth_of(self, solved: EdgePushing, wrt: Sequence[Node]) -> int:
         """Depth of the solution of some equations."""

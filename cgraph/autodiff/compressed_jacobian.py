@@ -12,9 +12,8 @@ from ..simplification.simplify import simplify
 from ..util.require import require_graph
 from .coloring import NONE, Coloring, column_coloring
 from .direction_split import direction_split
-from .jacobian_entries import written_sizes
 from .products import jvp
-from .sparsity import pattern
+from .sparsity import pattern, written_sizes
 
 LANES = 8  # colors that cost one sweep
 

@@ -180,7 +180,7 @@ def _solved(
             alone = EdgePushing(build, output, entries, at, nodes)
         with building(build):
             pieces = BalancedElimination(build, output, entries, at, nodes, fewest, rows)
-        if pieces.is_cut:
+        if pieces.copies:  # there is more than one piece
             _run(pieces, fewest, build)
             _run(alone, plan, Builder())
             if pieces.depth_of(pieces, wrt) < pieces.depth_of(alone, wrt):

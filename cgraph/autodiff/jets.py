@@ -7,8 +7,7 @@ same for all k > 0, the rest, from those sums, which run over many nodes at once
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..core.builder import Builder, folded
@@ -180,7 +179,7 @@ class _Jets:
         self.switches: list[Node] = []  # what decides them
         self.rounds: dict[Node, int] = {}  # {partial: how many operations were differentiated one after another for it}
         self.round = 0
-        with self._building():
+        with building(self.build):
             self.states = [before * (self.unit / self.k) for before in self.before]
             for k, node in enumerate(rate.inputs):
                 moving = self.states[k] if k < m else None
@@ -195,12 +194,9 @@ class _Jets:
                     raise NoSeriesError(_ENDLESS.format(op=node.op.name, rounds=ROUNDS))
                 self.at(node)
 
-    def _building(self) -> AbstractContextManager[Callable[[Label], None]]:
-        return building(self.build)
-
     def graphs(self) -> Jets:
         """The two graphs."""
-        with self._building():
+        with building(self.build):
             left = [self._number(a) * self.k if kind == "weighted" else self._number(a) for a, _, kind in self.sums]
             right = [self._number(b) for _, b, _ in self.sums]
             rates = [self._number(node) for node in self.rate.outputs.values()]

@@ -25,8 +25,7 @@ from ..core.traversal import topological
 from ..util.caches import OPERATIONS, memo
 from .elimination_order import EliminationStep
 from .rotation_pairs import Rotation, rotations
-from .symmetric_elimination import SymmetricElimination
-from .symmetric_matrix import ZERO
+from .symmetric_elimination import ZERO, SymmetricElimination
 
 ONE = as_node(1.0)
 
@@ -258,14 +257,6 @@ def _variable_sums(order: Sequence[Node], position: Mapping[Node, int]) -> dict[
     return sums
 
 
-class _Second(NamedTuple):
-    """d2y / da_j da_k of an operation y(a), over placeholders: its nodes, arguments first, the result last."""
-
-    j: int
-    k: int
-    nodes: list[Node]
-
-
 def _second_partials(node: Node, build: Builder) -> list[tuple[int, int, Node]]:
     """(j, k, d2y / da_j da_k) for y = node and its arguments a, j >= k, where it is not zero; nodes made by `build`.
 
@@ -286,8 +277,11 @@ def _second_partials(node: Node, build: Builder) -> list[tuple[int, int, Node]]:
 
 
 @memo(OPERATIONS)
-def _seconds_of(op: Row) -> tuple[Node, list[Node], list[_Second]]:
-    """Placeholders for the output y and the arguments a of an operation, and its second partials over them."""
+def _seconds_of(op: Row) -> tuple[Node, list[Node], list[tuple[int, int, list[Node]]]]:
+    """Placeholders for the output y and the arguments a of an operation, and its second partials over them.
+
+    These as (j, k, nodes of d2y / da_j da_k, arguments first, the result last).
+    """
     output = variable("output#")
     arguments = [variable(f"argument{i}#") for i in range(op.arity)]
     build = Builder()
@@ -300,5 +294,5 @@ def _seconds_of(op: Row) -> tuple[Node, list[Node], list[_Second]]:
         for k in range(j + 1):
             dots = tangents({arguments[j]: one, output: first[j]}, first, build)
             if first[k] in dots:
-                seconds.append(_Second(j, k, topological([dots[first[k]]])))
+                seconds.append((j, k, topological([dots[first[k]]])))
     return output, arguments, seconds

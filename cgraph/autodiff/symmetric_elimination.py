@@ -1,14 +1,19 @@
-"""Gaussian elimination on a sparse symmetric matrix of nodes, with pivots of one or two unknowns."""
+"""Gaussian elimination on a sparse symmetric matrix of nodes, with pivots of one or two unknowns, and dense solves."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
+from ..core.builder import Builder
 from ..core.checks import GraphError
-from ..core.node import Node, as_node
+from ..core.node import Node, as_node, variable
+from ..core.scope import building
 from ..operations.table import equal, less, where
-from .symmetric_matrix import ZERO, SymmetricMatrix
+from ..util.explain_failure import explain_failure
+
+ZERO = as_node(0.0)
+SUM_ROUNDING = 2.0**-50
 
 
 class SingularError(GraphError):
@@ -32,6 +37,46 @@ class PivotRow(NamedTuple):
     pivot: Node  # what was divided by
     constant: Node
     gains: dict[Node, Node]
+
+
+class SymmetricMatrix:
+    """A sparse matrix with rows and columns named by nodes: entries W_ab = W_ba in both rows; an absent one is zero."""
+
+    def __init__(self) -> None:
+        self._rows: dict[Node, dict[Node, Node]] = {}
+
+    def row(self, a: Node) -> Mapping[Node, Node]:
+        """The entries {b: W_ab} of a row."""
+        return self._rows.get(a, {})
+
+    def add(self, a: Node, b: Node, value: Node) -> None:
+        """W_ab += value, and W_ba with it."""
+        if value.value == 0.0:
+            return
+        row = self._rows.setdefault(a, {})
+        total = _sum(row[b], value) if b in row else value
+        row[b] = total
+        self._rows.setdefault(b, {})[a] = total
+
+    def add_both(self, a: Node, b: Node, value: Node) -> None:
+        """W_ab += value and W_ba += value, which on the diagonal are two additions to one entry."""
+        self.add(a, b, 2.0 * value if a is b else value)
+
+    def pop(self, a: Node) -> tuple[Node, dict[Node, Node]]:
+        """W_aa and the entries {b: W_ab} off the diagonal; row and column a leave the matrix."""
+        row = self._rows.pop(a, {})
+        diagonal = row.pop(a, ZERO)
+        for b in row:
+            del self._rows[b][a]
+        return diagonal, row
+
+
+def _sum(a: Node, b: Node) -> Node:
+    """a + b; of two constants that cancel to their last bits, which are rounding, zero."""
+    total = a + b
+    if a.value is None or b.value is None or total.value is None:
+        return total
+    return ZERO if abs(total.value) <= SUM_ROUNDING * abs(b.value) else total
 
 
 class SymmetricElimination:
@@ -132,3 +177,40 @@ class SymmetricElimination:
             right = less(row.pivot, 0.0) if i in negative else less(0.0, row.pivot)
             info = where(right, info, 1.0 + self.place[i])
         return info
+
+
+@explain_failure
+def ldl_solve(
+    lower: Sequence[Sequence[Node]], rhs: Sequence[Node], build: Builder | None = None, *, check: bool = False
+) -> list[Node]:
+    """Nodes x with A x = rhs for a symmetric, definite A, by an LDL^T factorization.
+
+    Rows are eliminated from the last up: for bodies from the tip to the base. Structural zeros cost nothing. A row
+    whose pivot is the constant zero waits, and leaves with another if it has to.
+    lower: row i of the lower triangle has at least i + 1 entries.  check: append a node: 0 where all pivots are
+    positive, else 1 + the index of the first that is not.
+    Raises SingularError if a row has only zeros left, or with `check` a constant pivot is not positive.
+    """
+    _require_triangle(lower, rhs)
+    unknowns = [variable(f"unknown{i}#") for i in range(len(rhs))]
+    with building(build or Builder()):
+        equations = SymmetricElimination(dict(zip(unknowns, rhs, strict=True)), {x: i for i, x in enumerate(unknowns)})
+        for i, row in enumerate(lower):
+            for j in range(i + 1):
+                equations.matrix.add(unknowns[i], unknowns[j], row[j])
+        for unknown in reversed(unknowns):  # A = L D L^T from the last row up, and b with it
+            equations.eliminate(unknown)
+        equations.eliminate_waiting()
+        solution: dict[Node, Node] = {}  # L^T x = D^-1 L^-1 b, the last to leave first
+        for unknown in reversed(equations.pivot_rows):
+            solution[unknown] = equations.solution(unknown, solution)
+        return [solution[unknown] for unknown in unknowns] + ([equations.info()] if check else [])
+
+
+def _require_triangle(lower: Sequence[Sequence[object]], rhs: Sequence[object]) -> None:
+    lengths = [len(row) for row in lower]
+    if len(lengths) != len(rhs) or any([length <= i for i, length in enumerate(lengths)]):
+        raise ValueError(f"lower needs at least 1 to {len(rhs)} entries in {len(rhs)} rows as rhs has, got {lengths}")
+    for entry in (*rhs, *[entry for row in lower for entry in row]):
+        if not hasattr(entry, "__truediv__"):
+            raise TypeError(f"lower and rhs must be numbers, got {type(entry).__name__}: {entry!r:.60}")

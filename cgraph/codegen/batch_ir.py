@@ -155,8 +155,7 @@ def _mover(name: str, count: int, arithmetic: Arithmetic, *, filling: bool) -> l
         with ir.loop(0, count, lanes) as i:
             far = ir.integer("icmp sgt", i, count - lanes)
             _transpose(ir, rows, ir.value(f"select i1 {far}, i64 {count - lanes}, i64 {i}"), filling)
-    head = f"internal void @{name}(ptr noalias %rows, ptr noalias %vectors, i64 %d) nounwind noinline"
-    return ir.function(head)
+    return ir.function(f"internal void @{name}(ptr noalias %rows, ptr noalias %vectors, i64 %d) nounwind noinline")
 
 
 def _transpose(ir: FunctionWriter, rows: Sequence[str], r: str, filling: bool) -> None:

@@ -18,40 +18,33 @@ SUFFIX, UNFINISHED = ".code", ".unfinished"
 LARGEST_ENTRY = 2**28  # bytes of an entry; the machine code of a million nodes takes a tenth
 
 
-class Cache:
-    """A folder with an entry for each thing compiled: the checksum of what follows, and what follows.
+def cached_code(folder: Path, recipe: str, make: Callable[[], bytes]) -> bytes:
+    """The bytes kept in a folder for a recipe, the text of all that they depend on; else `make()`, kept from now on.
 
-    The folder is made at the first entry, for its owner alone. Any number of threads and processes may use it at once:
-    an entry appears whole or not at all. One that is damaged, or that another user could have written, is made anew.
+    The folder is made at the first entry, for its owner alone; an entry is the checksum of what follows, and what
+    follows. Any number of threads and processes may use it at once: an entry appears whole or not at all. One that is
+    damaged, or that another user could have written, is made anew.
+    Warns (RuntimeWarning) when they cannot be kept: the result is right, but the time that was to be saved is not.
     """
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def fetch(self, recipe: str, make: Callable[[], bytes]) -> bytes:
-        """The bytes kept for a recipe, the text of all that they depend on; else `make()`, kept from now on.
-
-        Warns (RuntimeWarning) when they cannot be kept: the result is right, but the time that was to be saved is not.
-        """
-        name = sha256(f"{FORMAT}\n{recipe}".encode()).hexdigest()
-        path = self.folder / f"{name}{SUFFIX}"
-        content = _read(path)
-        if content is None:
-            content = make()
-            try:
-                _write(path, content)
-            except OSError as error:
-                if _read(path) is None:  # Windows replaces no file that another process has just written and reads
-                    _warn(f" in {self.folder}: {error.strerror or error}")
-        return content
+    name = sha256(f"{FORMAT}\n{recipe}".encode()).hexdigest()
+    path = folder / f"{name}{SUFFIX}"
+    content = _read(path)
+    if content is None:
+        content = make()
+        try:
+            _write(path, content)
+        except OSError as error:
+            if _read(path) is None:  # Windows replaces no file that another process has just written and reads
+                _warn(f" in {folder}: {error.strerror or error}")
+    return content
 
 
-def open_cache(choice: bool | str) -> Cache | None:
-    """The cache in a folder; True: in the platform's folder for caches; False: none."""
+def cache_folder(choice: bool | str) -> Path | None:
+    """The folder of a cache; True: in the platform's folder for caches; False: none."""
     if choice is False:
         return None
     try:
-        return Cache(default_folder() if choice is True else Path(choice))
+        return default_folder() if choice is True else Path(choice)
     except RuntimeError as error:  # this user has no home
         _warn(f": {error}")
         return None
@@ -108,7 +101,9 @@ def default_folder() -> Path:
 def _read(path: Path) -> bytes | None:
     """Content of an entry; None if there is none to trust: whoever writes an entry decides what this process runs."""
     try:
-        with open(path, "rb", opener=_open_at_once) as file:
+        # Without waiting for somebody who writes where the name is a pipe's.
+        at_once = getattr(os, "O_NONBLOCK", 0)
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | at_once)) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_ENTRY or not _ours(status):
                 return None
@@ -116,11 +111,6 @@ def _read(path: Path) -> bytes | None:
     except OSError:
         return None
     return content if checksum == _checksum(path, content) else None
-
-
-def _open_at_once(name: str, flags: int) -> int:
-    """A file descriptor, without waiting for somebody who writes where the name is a pipe's."""
-    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _write(path: Path, content: bytes) -> None:

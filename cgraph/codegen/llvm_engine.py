@@ -6,16 +6,16 @@ import ctypes.util
 import threading
 import weakref
 from collections.abc import Iterable
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ..util.caches import memo
 from ..util.extras import install
+from .disk_cache import cached_code
 
 if TYPE_CHECKING:
     from llvmlite.binding import ExecutionEngine, TargetMachine
-
-    from .disk_cache import Cache
 
 LEVEL = 2  # of the code generator's optimization; the text has no redundancy for passes over it to find
 SHORT = 2000  # nodes; beyond, level 1 but in vectors: three quarters of the time to compile, code as fast within 2 %.
@@ -71,12 +71,12 @@ class Host:
         text: str,
         functions: Iterable[str],
         nodes: int,
-        cache: Cache | None = None,
+        cache: Path | None = None,
         *,
         lanes: int = 1,
         looped: bool = False,
     ) -> Code:
-        """Machine code, made or found in the cache, of a module's text that calls these functions of the C library.
+        """Machine code, made or found in a folder, of a module's text that calls these functions of the C library.
 
         nodes: of its graphs.  lanes: of its numbers.  looped: whether they are loops over vectors that wait for memory.
         """
@@ -86,7 +86,7 @@ class Host:
             if cache is None:
                 return self._loaded(self._translated(text, level))
             recipe = f"{self._identity}\nlevel {level}\n{text}"
-            return self._loaded(cache.fetch(recipe, lambda: self._translated(text, level)))
+            return self._loaded(cached_code(cache, recipe, lambda: self._translated(text, level)))
 
     def require(self, functions: Iterable[str]) -> None:
         """Raise MissingFunctionError unless the C library has them."""

@@ -58,7 +58,12 @@ def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
             alone = {columns(node.op).library for node in graph.nodes if node not in calls}
             called |= {name: arity for name, arity in libm_functions(graph).items() if name in alone}
     vector = _vector(arithmetic)
-    return [*declarations(libm), *helpers(called, vector.lanes, vector.flags, polynomials=vector.polynomials)]
+    # nobuiltin: LLVM would make pow(x, 2) into x * x, which differs in the last bit. Nobody reads errno.
+    declarations = [
+        f"declare double @{name}({', '.join(['double'] * arity)}) nounwind willreturn memory(none) nobuiltin"
+        for name, arity in libm.items()
+    ]
+    return [*declarations, *helpers(called, vector.lanes, vector.flags, polynomials=vector.polynomials)]
 
 
 def _joined_calls(graph: Graph, arithmetic: Arithmetic) -> dict[Node, Joined]:
@@ -72,15 +77,6 @@ def _of_libm(graph: Graph, arithmetic: Arithmetic) -> set[Node]:
         return set()
     joined = joined_calls(graph, TOGETHER)
     return {node for node in graph.nodes if node.args and columns(node.op).library in POLYNOMIAL and node not in joined}
-
-
-def declarations(functions: Mapping[str, int]) -> list[str]:
-    """The functions of the C library, {name: number of arguments}, as the module has to declare them."""
-    # nobuiltin: LLVM would make pow(x, 2) into x * x, which differs in the last bit. Nobody reads errno.
-    return [
-        f"declare double @{name}({', '.join(['double'] * arity)}) nounwind willreturn memory(none) nobuiltin"
-        for name, arity in functions.items()
-    ]
 
 
 def write_graph(
@@ -278,20 +274,17 @@ def _step(
         return _result(step, merged.calls[step], r, args[0], arithmetic)
     if step in merged.products:
         return r, _product_and_sum(step, merged.products[step], r, args, arithmetic)
-    t, kind = arithmetic.type, "each" if step in merged.of_libm else "lanes"
-    call = f"@{f'{kind}{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{columns(step.op).library}"
-    if columns(step.op).llvm == LLVM_WHERE and _compares(step.args[0]):
+    t, op, kind = arithmetic.type, columns(step.op), "each" if step in merged.of_libm else "lanes"
+    call = f"@{f'{kind}{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{op.library}"
+    condition = step.args[0]
+    # The name of a value that is 1 or 0 by a comparison has that with ".is" beside it.
+    if op.llvm == LLVM_WHERE and condition.args and columns(condition.op).llvm[-1:] == (LLVM_ONE_OR_ZERO,):
         known = args[0].startswith("%v")
         compared = [] if known else [f"  {r}.is = fcmp one {t} {args[0]}, {words['zero']}"]  # never NaN: one flag
         return r, [*compared, f"  {r} = select {words['b']} {args[0] if known else r}.is, {t} {args[1]}, {t} {args[2]}"]
-    if columns(step.op).llvm:
-        return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in columns(step.op).llvm]
+    if op.llvm:
+        return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in op.llvm]
     return r, [f"  {r} = call {t} {call}({', '.join(f'{t} {arg}' for arg in args)})"]
-
-
-def _compares(node: Node) -> bool:
-    """Whether a node is 1 or 0 by a comparison, whose name is that of the value with ".is"."""
-    return bool(node.args) and columns(node.op).llvm[-1:] == (LLVM_ONE_OR_ZERO,)
 
 
 def _product_and_sum(node: Node, product: Node, r: str, args: list[str], arithmetic: Arithmetic) -> list[str]:

@@ -114,13 +114,8 @@ def _names(graph: Graph, helpers: Iterable[str]) -> dict[Node, str]:
     names, number = {node: f"x{mark}{i}" for i, node in enumerate(graph.inputs)}, 0
     for node in graph.nodes:
         if node.op is CONSTANT:
-            assert node.value is not None
-            names[node] = _number(node.value)
+            text = repr(node.value)
+            names[node] = f"({text})" if text.startswith("-") else text
         elif node not in names:
             names[node] = f"v{mark}{(number := number + 1)}"
     return names
-
-
-def _number(value: float) -> str:
-    text = repr(value)
-    return f"({text})" if text.startswith("-") else text

@@ -79,24 +79,20 @@ class Counts:
     by_role: dict[str, int]
 
     def __str__(self) -> str:
-        def row(title: str, counts: dict[str, int]) -> str:
+        lines = [f"nodes {self.nodes}, edges {self.edges}, depth {self.depth}, width {self.width}"]
+        for group, counts in self._groups.items():
             listed = ", ".join(f"{name} {n}" for name, n in counts.items())
-            return f"{title:13}{listed or '-'}"
-
-        return "\n".join(
-            (
-                f"nodes {self.nodes}, edges {self.edges}, depth {self.depth}, width {self.width}",
-                row("by operation", self.by_operation),
-                row("by tag", self.by_tag),
-                row("by role", self.by_role),
-            )
-        )
+            lines.append(f"{f'by {group}':13}{listed or '-'}")
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         sizes = [(name, str(getattr(self, name))) for name in ("nodes", "edges", "depth", "width")]
-        groups = {"operation": self.by_operation, "tag": self.by_tag, "role": self.by_role}
-        rows = [(f"{kind} {name}", str(n)) for kind, counts in groups.items() for name, n in counts.items()]
+        rows = [(f"{group} {name}", str(n)) for group, counts in self._groups.items() for name, n in counts.items()]
         return html_table(("", "count"), sizes + rows)
+
+    @property
+    def _groups(self) -> dict[str, dict[str, int]]:
+        return {"operation": self.by_operation, "tag": self.by_tag, "role": self.by_role}
 
 
 class Graph:
@@ -141,8 +137,24 @@ class Graph:
     nodes: tuple[Node, ...]
 
     def __init__(self, inputs: Sequence[Node], outputs: Mapping[str, Scalar]) -> None:
-        self.inputs = _checked_inputs(inputs)
-        self.outputs = _checked_outputs(outputs)
+        if isinstance(inputs, Node) or not isinstance(inputs, Iterable):
+            raise TypeError(f"inputs must be a sequence of variables, got {inputs!r:.60}; write [x]")
+        self.inputs = tuple(inputs)
+        if wrong := [node for node in self.inputs if not isinstance(node, Node) or node.op is not VARIABLE]:
+            raise TypeError(f"an input must be a variable, got {wrong[0]!r:.60}")
+        if twice := [name for name, count in Counter([node.name for node in self.inputs]).items() if count > 1]:
+            raise GraphError(f"input {twice[0]!r} is listed more than once")
+        if not isinstance(outputs, Mapping):
+            raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
+        if not outputs:
+            raise GraphError("a graph needs at least one output")
+        self.outputs = {}
+        for name, value in outputs.items():
+            name = check_name("an output", name)
+            try:
+                self.outputs[name] = as_node(value)
+            except TypeError as error:
+                raise TypeError(f"output {name!r}: {error}") from None
         self.nodes = tuple(topological(self.outputs.values()))
         known = set(self.inputs)
         if free := [node.name for node in self.nodes if node.op is VARIABLE and node not in known]:
@@ -165,7 +177,24 @@ class Graph:
 
         Raises GraphError if the graph has no such input or one is named twice, TypeError for anything else.
         """
-        return self.inputs if wrt is None else _chosen_inputs(self.inputs, wrt)
+        if wrt is None:
+            return self.inputs
+        if not isinstance(wrt, (str, Node, Iterable)):
+            raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
+        inputs, chosen = set(self.inputs), dict[Node, None]()
+        names = ", ".join(self.input_names) or "none"
+        for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
+            node = variable(name) if isinstance(name, str) else name
+            if not isinstance(node, Node):
+                raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
+            if node not in inputs:
+                raise GraphError(f"the graph has no input {node.name or node!r} (it has {names})")
+            if node in chosen:
+                raise GraphError(f"wrt names the input {node.name} twice")
+            chosen[node] = None
+        if not chosen:
+            raise GraphError(f"wrt must name at least one input (the graph has {names})")
+        return tuple(chosen)
 
     def only_output(self) -> Node:
         """The one output. Raises GraphError if there are several."""
@@ -215,15 +244,60 @@ class Graph:
 
     def counts(self) -> Counts:
         """Nodes, edges, depth, width, and nodes by operation, tag and role."""
-        return _counted(self.nodes)
+        level: dict[Node, int] = {}
+        operations, tags, roles = groups = Counter[str](), Counter[str](), Counter[str]()
+        for node in self.nodes:
+            level[node] = 1 + max(level[arg] for arg in node.args) if node.args else 0
+            operations[node.op.name] += 1
+            tags.update(node.tags)
+            roles.update(node.roles)
+        edges, depth = sum([len(node.args) for node in self.nodes]), max(level.values(), default=0)
+        width = max(Counter(level.values()).values(), default=0)
+        return Counts(len(level), edges, depth, width, *map(largest_first, groups))
 
     def listing(self) -> str:
         """The graph as text, a node a line, the same in every run."""
-        return _listing(self.input_names, self.nodes, self.outputs)
+        lines = [f"inputs {' '.join(self.input_names)}"]
+        text: dict[Node, str] = {}
+        for node in self.nodes:
+            if node.op is CONSTANT:
+                text[node] = repr(node.value)
+            elif node.op is VARIABLE:
+                text[node] = str(node.name)
+            else:  # such as `%3 = mul %1 %2  # adjoint; kinetic, link 2`
+                text[node] = f"%{len(lines)}"
+                line = f"{text[node]} = {node.op.name} {' '.join([text[arg] for arg in node.args])}"
+                notes = [", ".join(sorted(labels)) for labels in (node.roles, node.tags) if labels]
+                name = f"  ({node.name})" if node.name else ""
+                lines.append(line + name + (f"  # {'; '.join(notes)}" if notes else ""))
+        lines.extend(f"output {name} = {text[node]}" for name, node in self.outputs.items())
+        return "\n".join(lines) + "\n"
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
-        _check(self.nodes, self.outputs)
+        for node in self.nodes:
+            if not isinstance(node, Node) or not isinstance(node.op, Row):
+                raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
+            if node.op is CONSTANT:
+                if type(node.value) is not float or node.value != node.value:
+                    raise GraphError(f"constant {node.value!r} is not a number")
+            elif node.op is VARIABLE:
+                if not node.name:
+                    raise GraphError("a variable has no name")
+            elif ROWS.get(node.op.name) is not node.op:
+                raise GraphError(f"operation {node.op.name!r} is not in the table")
+            if len(node.args) != node.op.arity:
+                raise GraphError(f"{node.op.name} takes {node.op.arity} argument(s), a node has {len(node.args)}")
+            for arg in node.args:
+                if not isinstance(arg, Node):
+                    raise GraphError(f"an argument of {node!r} is not a node: {arg!r:.60}")
+        if set(topological(self.outputs.values())) != set(self.nodes):
+            raise GraphError("the nodes are not those that the outputs reach")
+        visited: set[Node] = set()
+        for node in self.nodes:
+            if not visited.issuperset(node.args):
+                raise GraphError(f"{node!r} comes before one of its arguments")
+            visited.add(node)
 
     def __repr__(self) -> str:
         ends, edges = map(_short, (self.input_names, tuple(self.outputs))), sum(len(node.args) for node in self.nodes)
@@ -234,122 +308,9 @@ class Graph:
         return render_html("graph", self)
 
 
-def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
-    if isinstance(inputs, Node) or not isinstance(inputs, Iterable):
-        raise TypeError(f"inputs must be a sequence of variables, got {inputs!r:.60}; write [x]")
-    nodes = tuple(inputs)
-    if wrong := [node for node in nodes if not isinstance(node, Node) or node.op is not VARIABLE]:
-        raise TypeError(f"an input must be a variable, got {wrong[0]!r:.60}")
-    if twice := [name for name, count in Counter([node.name for node in nodes]).items() if count > 1]:
-        raise GraphError(f"input {twice[0]!r} is listed more than once")
-    return nodes
-
-
-def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
-    if not isinstance(outputs, Mapping):
-        raise TypeError(f"outputs must map names to nodes, got {type(outputs).__name__}")
-    if not outputs:
-        raise GraphError("a graph needs at least one output")
-    nodes = {}
-    for name, value in outputs.items():
-        name = check_name("an output", name)
-        try:
-            nodes[name] = as_node(value)
-        except TypeError as error:
-            raise TypeError(f"output {name!r}: {error}") from None
-    return nodes
-
-
-def _chosen_inputs(given: Sequence[Node], wrt: str | Node | Sequence[str | Node]) -> tuple[Node, ...]:
-    """Those of a graph's inputs that `wrt` names. Raises as `Graph.select_inputs`."""
-    if not isinstance(wrt, (str, Node, Iterable)):
-        raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
-    inputs, chosen = set(given), dict[Node, None]()
-    names = ", ".join([str(node.name) for node in given]) or "none"
-    for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
-        node = variable(name) if isinstance(name, str) else name
-        if not isinstance(node, Node):
-            raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
-        if node not in inputs:
-            raise GraphError(f"the graph has no input {node.name or node!r} (it has {names})")
-        if node in chosen:
-            raise GraphError(f"wrt names the input {node.name} twice")
-        chosen[node] = None
-    if not chosen:
-        raise GraphError(f"wrt must name at least one input (the graph has {names})")
-    return tuple(chosen)
-
-
-def _counted(nodes: Iterable[Node]) -> Counts:
-    """Counts of nodes in topological order."""
-    level: dict[Node, int] = {}
-    operations: Counter[str] = Counter()
-    tags: Counter[str] = Counter()
-    roles: Counter[str] = Counter()
-    edges = 0
-    for node in nodes:
-        level[node] = 1 + max(level[arg] for arg in node.args) if node.args else 0
-        operations[node.op.name] += 1
-        edges += len(node.args)
-        tags.update(node.tags)
-        roles.update(node.roles)
-    width = max(Counter(level.values()).values(), default=0)
-    return Counts(len(level), edges, max(level.values(), default=0), width, *map(_sorted, (operations, tags, roles)))
-
-
-def _sorted(counter: Counter[str]) -> dict[str, int]:
+def largest_first(counter: Counter[str]) -> dict[str, int]:
+    """The counts, those that are equal by name."""
     return dict(sorted(counter.items(), key=lambda item: (-item[1], item[0])))
-
-
-def _listing(inputs: Sequence[str], nodes: Sequence[Node], outputs: Mapping[str, Node]) -> str:
-    """Text such as `%3 = mul %1 %2  # adjoint; kinetic, link 2`, operations numbered in topological order."""
-    lines = [f"inputs {' '.join(inputs)}"]
-    text: dict[Node, str] = {}
-    for node in nodes:
-        if node.op is CONSTANT:
-            text[node] = repr(node.value)
-        elif node.op is VARIABLE:
-            text[node] = str(node.name)
-        else:
-            text[node] = f"%{len(lines)}"
-            line = f"{text[node]} = {node.op.name} {' '.join([text[arg] for arg in node.args])}"
-            notes = [", ".join(sorted(labels)) for labels in (node.roles, node.tags) if labels]
-            name = f"  ({node.name})" if node.name else ""
-            lines.append(line + name + (f"  # {'; '.join(notes)}" if notes else ""))
-    lines.extend(f"output {name} = {text[node]}" for name, node in outputs.items())
-    return "\n".join(lines) + "\n"
-
-
-def _check(nodes: Sequence[Node], outputs: Mapping[str, Node]) -> None:
-    """Raise GraphError for a graph that no public function could have made."""
-    for node in nodes:
-        _check_node(node)
-    if set(topological(outputs.values())) != set(nodes):
-        raise GraphError("the nodes are not those that the outputs reach")
-    visited: set[Node] = set()
-    for node in nodes:
-        if not visited.issuperset(node.args):
-            raise GraphError(f"{node!r} comes before one of its arguments")
-        visited.add(node)
-
-
-def _check_node(node: Node) -> None:
-    """Raise GraphError unless the node is well formed."""
-    if not isinstance(node, Node) or not isinstance(node.op, Row):
-        raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
-    if node.op is CONSTANT:
-        if type(node.value) is not float or node.value != node.value:
-            raise GraphError(f"constant {node.value!r} is not a number")
-    elif node.op is VARIABLE:
-        if not node.name:
-            raise GraphError("a variable has no name")
-    elif ROWS.get(node.op.name) is not node.op:
-        raise GraphError(f"operation {node.op.name!r} is not in the table")
-    if len(node.args) != node.op.arity:
-        raise GraphError(f"{node.op.name} takes {node.op.arity} argument(s), a node has {len(node.args)}")
-    for arg in node.args:
-        if not isinstance(arg, Node):
-            raise GraphError(f"an argument of {node!r} is not a node: {arg!r:.60}")
 
 
 def _short(names: Sequence[str]) -> str:

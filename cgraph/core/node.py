@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+from collections.abc import Callable
 from functools import partial
 from itertools import count
 from typing import Any, NoReturn, SupportsFloat
@@ -17,6 +18,22 @@ from .row import BY_UFUNC, ROWS, Row
 from .scope import current, formulating
 
 VARIABLE, CONSTANT = [Row(name, 0, float, float, lambda *_: ()) for name in ("variable", "constant")]
+
+
+def _operators(name: str) -> tuple[Callable[[Node, Scalar], Node], Callable[[Node, Scalar], Node]]:
+    """The methods of an operation on a node and another operand, and on that and the node."""
+
+    def operate(self: Node, other: Scalar) -> Node:
+        return _binary(name, self, other)
+
+    def operate_turned(self: Node, other: Scalar) -> Node:
+        return _binary(name, other, self)
+
+    return operate, operate_turned
+
+
+def _unary(name: str) -> Callable[[Node], Node]:
+    return lambda self: apply(ROWS[name], self)
 
 
 class Node:
@@ -149,65 +166,20 @@ class Node:
         return elementwise(op, *inputs)
 
     # Operators look the row up by name, so that the table stays the one place that knows operations.
-    def __add__(self, other: Scalar) -> Node:
-        return _binary("add", self, other)
-
-    def __radd__(self, other: Scalar) -> Node:
-        return _binary("add", other, self)
-
-    def __sub__(self, other: Scalar) -> Node:
-        return _binary("sub", self, other)
-
-    def __rsub__(self, other: Scalar) -> Node:
-        return _binary("sub", other, self)
-
-    def __mul__(self, other: Scalar) -> Node:
-        return _binary("mul", self, other)
-
-    def __rmul__(self, other: Scalar) -> Node:
-        return _binary("mul", other, self)
-
-    def __truediv__(self, other: Scalar) -> Node:
-        return _binary("div", self, other)
-
-    def __rtruediv__(self, other: Scalar) -> Node:
-        return _binary("div", other, self)
-
-    def __pow__(self, other: Scalar) -> Node:
-        return _binary("pow", self, other)
-
-    def __rpow__(self, other: Scalar) -> Node:
-        return _binary("pow", other, self)
-
-    def __lt__(self, other: Scalar) -> Node:
-        return _binary("less", self, other)
-
-    def __le__(self, other: Scalar) -> Node:
-        return _binary("less_equal", self, other)
-
-    def __gt__(self, other: Scalar) -> Node:
-        return _binary("less", other, self)
-
-    def __ge__(self, other: Scalar) -> Node:
-        return _binary("less_equal", other, self)
-
-    def __neg__(self) -> Node:
-        return apply(ROWS["neg"], self)
-
-    def __pos__(self) -> Node:
-        return self
-
-    def __abs__(self) -> Node:
-        return apply(ROWS["abs"], self)
-
-    def __floor__(self) -> Node:
-        return apply(ROWS["floor"], self)
-
-    def __ceil__(self) -> Node:
-        return apply(ROWS["ceil"], self)
+    __add__, __radd__ = _operators("add")
+    __sub__, __rsub__ = _operators("sub")
+    __mul__, __rmul__ = _operators("mul")
+    __truediv__, __rtruediv__ = _operators("div")
+    __pow__, __rpow__ = _operators("pow")
+    __lt__, __gt__ = _operators("less")
+    __le__, __ge__ = _operators("less_equal")
+    __neg__, __abs__, __floor__, __ceil__ = map(_unary, ("neg", "abs", "floor", "ceil"))
 
     def __round__(self) -> Node:
         return apply(ROWS["round"], self)
+
+    def __pos__(self) -> Node:
+        return self
 
 
 class Leaf(Node):

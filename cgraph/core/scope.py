@@ -6,6 +6,7 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Any
 
 from .checks import check_name
@@ -15,14 +16,12 @@ from .label import WRITTEN, Label
 Build = Callable[[Any, tuple[Any, ...], Label], Any]
 
 
+@dataclass(slots=True, eq=False)
 class Scope:
     """Label of new nodes, and the builder that makes them (None: kept as written)."""
 
-    __slots__ = ("build", "label")
-
-    def __init__(self, label: Label, build: Build | None) -> None:
-        self.label = label
-        self.build = build
+    label: Label
+    build: Build | None
 
     def set_label(self, label: Label) -> None:
         """Set the label of the nodes to come."""

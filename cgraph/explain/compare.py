@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 from ..core.checks import GraphError
-from ..core.graph import Graph
+from ..core.graph import Graph, largest_first
 from ..core.html_text import html_lines
 from ..core.node import VARIABLE, Node, variable
 from ..util.json_type import Json
@@ -78,17 +78,15 @@ class Comparison:
         require_choice("side", side, ("left", "right"))
         graph, nodes = (self.left, self.only_left) if side == "left" else (self.right, self.only_right)
         name_of = self.classify(graph)
-        counts = Counter([name_of(node) for node in nodes])
-        return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
+        return largest_first(Counter([name_of(node) for node in nodes]))
 
     def __str__(self) -> str:
         sizes = f"{counted(len(self.left.nodes), 'node')} left, {len(self.right.nodes)} right"
         only = f"{len(self.only_left)} only left, {len(self.only_right)} only right"
         lines = [f"{sizes}: {len(self.common)} in both, {only}."]
-        if self.same_outputs:
-            lines.append(f"Computed alike: {joined(self._shown(self.same_outputs))}.")
-        if self.other_outputs:
-            lines.append(f"Computed otherwise: {joined(self._shown(self.other_outputs))}.")
+        for how, outputs in (("alike", self.same_outputs), ("otherwise", self.other_outputs)):
+            if outputs:
+                lines.append(f"Computed {how}: {joined([self.names.get(name, name) for name in outputs])}.")
         sides: tuple[Side, Side] = ("left", "right")
         for side in sides:
             if rows := list(self.classes(side).items()):
@@ -97,9 +95,6 @@ class Comparison:
                 if rest := rows[_SHOWN:]:
                     lines.append(f"  {sum([number for _, number in rest]):>5}  in {len(rest)} more classes")
         return "\n".join(lines)
-
-    def _shown(self, outputs: Sequence[str]) -> list[str]:
-        return [self.names.get(name, name) for name in outputs]
 
     def _repr_html_(self) -> str:
         return html_lines(str(self))

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 
-from ..core.checks import GraphError
 from ..core.evaluation import is_finite
 from ..core.graph import Edge, Graph
 from ..util.require import require_mapping
@@ -19,10 +18,7 @@ def checked(names: Names, at: Point) -> dict[str, float]:
     for name, value in require_mapping("at", at, "input: value").items():
         if isinstance(value, bool) or not is_finite(value):
             raise ValueError(f"at: input {name!r} must be a finite number, got {value!r:.60}")
-    given = names.inputs_of("at", at)
-    if missing := [names.shown(name) for name in names.graph.input_names if name not in given]:
-        raise GraphError(f"at: no value for input {', '.join(missing)}")
-    return {name: float(value) for name, value in given.items()}
+    return {name: float(value) for name, value in names.inputs_of("at", at, all_of_them=True).items()}
 
 
 def edge_slopes(names: Names, edges: Sequence[Edge], at: Point) -> list[float]:

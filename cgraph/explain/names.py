@@ -73,8 +73,11 @@ class Names:
         """Name, as a person writes it, of a node or of the name of one."""
         return self.shown(self.meant(who)) if isinstance(who, str) else self.text(who)
 
-    def inputs_of(self, what: str, values: Mapping[str, Value]) -> dict[str, Value]:
-        """Values by the graph's names of inputs. Raises GraphError, naming `what`, for what is no input, or twice."""
+    def inputs_of(self, what: str, values: Mapping[str, Value], *, all_of_them: bool = False) -> dict[str, Value]:
+        """Values by the graph's names of inputs. Raises GraphError, naming `what`, for what is no input, or twice.
+
+        all_of_them: whether to raise it, too, for an input without a value.
+        """
         result: dict[str, Value] = {}
         inputs = dict.fromkeys(self.graph.input_names)
         for name, value in require_mapping(what, values, "input: value").items():
@@ -86,6 +89,8 @@ class Names:
             if meant in result:
                 raise GraphError(f"{what} gives the input {self.shown(meant)} twice, once as {meant}")
             result[meant] = value
+        if all_of_them and (missing := [self.shown(name) for name in inputs if name not in result]):
+            raise GraphError(f"{what}: no value for input {', '.join(missing)}")
         return result
 
     # From a name to nodes.

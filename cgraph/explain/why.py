@@ -18,8 +18,7 @@ from ..util.words import counted
 from ..writing.source_lines import lines_text
 from .edge_partials import Point, edge_slopes
 from .names import Name, Names
-from .paths import best_paths, by_target, path_count
-from .reachability import between
+from .paths import best_paths, between, by_target, path_count
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LONGEST_PATH = 90  # characters up to which a path is written out; a longer one is written by its tags
@@ -236,8 +235,7 @@ def _contributing(
 
     What lies behind a zero, such as the branch that `where` does not take, may have no derivative: zero wins.
     """
-    live = {sink}
-    kept = []
+    live, kept = {sink}, set[Edge]()
     incoming = by_target(edges)
     for node in reversed(nodes):
         for edge in incoming.get(node, ()) if node in live else ():
@@ -247,9 +245,8 @@ def _contributing(
             if not math.isfinite(slope):
                 raise GraphError(f"the derivative of {names.line(node)} by {names.text(edge.source)} is {slope} here")
             live.add(edge.source)
-            kept.append(edge)
-    chosen = set(kept)
-    return [edge for edge in edges if edge in chosen]
+            kept.add(edge)
+    return [edge for edge in edges if edge in kept]
 
 
 def _path_sums(
@@ -301,14 +298,11 @@ def _route(names: Names, nodes: Sequence[Node]) -> list[str]:
 
 def _told_apart(names: Names, paths: Sequence[Path]) -> list[Path]:
     """The paths; of those that read the same, with all their sums, and by which argument each operation is reached."""
-    times = Counter([path.text for path in paths])
-    return [
-        replace(path, text=f"{path.text}  ({_edges(names, path)})") if times[path.text] > 1 else path for path in paths
-    ]
-
-
-def _edges(names: Names, path: Path) -> str:
-    return " ".join([f"%{names.number[edge.target]}.{edge.slot + 1}" for edge in path.edges])
+    times, result = Counter([path.text for path in paths]), []
+    for path in paths:
+        edges = " ".join([f"%{names.number[edge.target]}.{edge.slot + 1}" for edge in path.edges])
+        result.append(replace(path, text=f"{path.text}  ({edges})") if times[path.text] > 1 else path)
+    return result
 
 
 def digits_of(count: int) -> str:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ..core.checks import GraphError
 from ..core.evaluation import real_number
 from ..core.graph import Edge, Graph
 from ..core.html_text import html_lines
@@ -15,7 +14,7 @@ from ..core.reverse import cotangents
 from ..util.json_type import Json, json_number
 from ..util.require import require_graph, require_mapping
 from .names import Name, Names, joined
-from .reachability import between
+from .paths import between
 
 SHOWN = 8  # inputs, and operations on the way, that the text has
 
@@ -161,7 +160,8 @@ def why_nan(
     """
     require_graph("why_nan", graph)
     known = Names(graph, names)
-    point = _point(known, at)
+    given = known.inputs_of("at", require_mapping("at", at, "input: value"), all_of_them=True)
+    point = {name: real_number(f"at: input {known.shown(name)!r}", value) for name, value in given.items()}
     sinks = dict(graph.outputs)
     if output is not None:
         sink = known.output(output, "output")
@@ -180,14 +180,6 @@ def why_nan(
                 what = f"d {known.shown(name)} / d {known.text(source)}"
                 return _partial(known, values, what, bar, source, sink, point)
     return WhyNan(graph)
-
-
-def _point(names: Names, at: Mapping[str, float]) -> dict[str, float]:
-    given = names.inputs_of("at", require_mapping("at", at, "input: value"))
-    point = {name: real_number(f"at: input {names.shown(name)!r}", value) for name, value in given.items()}
-    if missing := [names.shown(name) for name in names.graph.input_names if name not in given]:
-        raise GraphError(f"at: no value for input {', '.join(missing)}")
-    return point
 
 
 def _values(graph: Graph, nodes: Sequence[Node], point: Mapping[str, float]) -> list[float]:

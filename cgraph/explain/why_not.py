@@ -13,7 +13,7 @@ from ..util.json_type import Json
 from ..util.require import require_graph
 from ..util.words import counted
 from .names import Name, Names, joined
-from .reachability import ancestors, descendants
+from .paths import ancestors, descendants
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,22 +11,20 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 
-def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> Path:
+def atomic_write(path: str | Path, data: str | bytes) -> Path:
     """Write a file whole or not at all, by a temporary file beside it; its path. Text is UTF-8, links are followed.
 
-    mode: permissions, less the process's umask.  Raises OSError with the path in its message; nothing is left behind.
+    Raises OSError with the path in its message; nothing is left behind.
     """
-    write_files({Path(path): data}, mode=mode)
+    write_files({Path(path): data})
     return Path(path)
 
 
-def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None:
+def write_files(files: Mapping[Path, str | bytes]) -> None:
     """Write several files, all or none: they take their places once all are written beside them. As `atomic_write`.
 
     A device or a pipe, such as /dev/null or /dev/stdout, is written to where it is, after the files.
     """
-    if not 0 <= mode <= 0o7777:
-        raise ValueError(f"mode must be permissions from 0 to 0o7777, got {mode!r:.20}")
     with ExitStack() as temporaries:
         written, others = [], []
         for path, data in files.items():
@@ -34,7 +32,7 @@ def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None
                 others.append((path, data))
                 continue
             target = path.resolve()  # through a link, so that the link stays one
-            temporary = temporaries.enter_context(_beside(target, mode))
+            temporary = temporaries.enter_context(_beside(target))
             with _named(target):
                 temporary.write_bytes(data.encode() if isinstance(data, str) else data)
             if target.is_dir():
@@ -60,7 +58,7 @@ def check_writable(path: str | Path) -> None:
     target = Path(path).resolve()
     if target.is_dir():
         raise _folder(target)
-    with _beside(target, 0o600):
+    with _beside(target):
         pass
 
 
@@ -78,12 +76,12 @@ def _folder(target: Path) -> OSError:
 
 
 @contextmanager
-def _beside(target: Path, mode: int) -> Iterator[Path]:
+def _beside(target: Path) -> Iterator[Path]:
     """A new empty file beside a file that is to be written; what is left of it goes in the end."""
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
         with _named(target):
-            temporary.touch(mode, exist_ok=False)
+            temporary.touch(exist_ok=False)
         yield temporary
     finally:
         with suppress(OSError):

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from functools import lru_cache, wraps
+from functools import _lru_cache_wrapper, lru_cache, wraps
 from threading import RLock
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 from weakref import WeakSet, ref
-
-if TYPE_CHECKING:
-    from functools import _CacheInfo
 
 Arguments = ParamSpec("Arguments")
 First = TypeVar("First")
@@ -24,12 +21,6 @@ class Memo(Protocol[Arguments, Result]):
     def __call__(self, *args: Arguments.args, **named: Arguments.kwargs) -> Result:
         """The result, kept or made."""
 
-    def cache_info(self) -> _CacheInfo:
-        """Numbers of results made and kept."""
-
-    def cache_clear(self) -> None:
-        """Keep none."""
-
 
 class _Results:
     """Results of calls whose first argument is one object. A copy of the object has none of them, here or pickled."""
@@ -43,7 +34,7 @@ class _Results:
 
 
 OPERATIONS = 128  # of which results are kept: thrice the table of operations
-_memos: list[Memo[..., object]] = []
+_memos: list[_lru_cache_wrapper[Any]] = []
 _kept: WeakSet[_Results] = WeakSet()
 
 
@@ -51,9 +42,9 @@ def memo(size: int) -> Callable[[Callable[Arguments, Result]], Memo[Arguments, R
     """A decorator: the function, of hashable arguments, keeps its last `size` results until `clear_caches`."""
 
     def decorate(function: Callable[Arguments, Result]) -> Memo[Arguments, Result]:
-        keeping = cast("Memo[Arguments, Result]", lru_cache(size)(function))
-        _memos.append(cast("Memo[..., object]", keeping))
-        return keeping
+        keeping = lru_cache(size)(function)
+        _memos.append(keeping)
+        return cast("Memo[Arguments, Result]", keeping)
 
     return decorate
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-from .require import require_choice
-
 
 def install(extra: str) -> str:
     """Command that installs the packages of an extra, such as "viz", as the end of an error's sentence.
@@ -18,7 +16,6 @@ def install(extra: str) -> str:
 
 def scipy_module(name: str, what: str) -> ModuleType:
     """SciPy's module `integrate` or `sparse`. Raises ImportError, that `what` needs it, where there is none."""
-    require_choice("name", name, ("integrate", "sparse"))
     return required(f"scipy.{name}", f"{what} needs SciPy", "scipy")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from xml.etree import ElementTree
 
@@ -82,9 +83,7 @@ def literal(text: str) -> str:
 def name_texts(names: Iterable[str]) -> dict[str, str]:
     """Names in LaTeX, {name: text}; two that would look the same are written as they are."""
     texts = {name: _name(name) for name in names}
-    seen: dict[str, int] = {}
-    for text in texts.values():
-        seen[text] = seen.get(text, 0) + 1
+    seen = Counter(texts.values())
     return {name: text if seen[text] == 1 else literal(name) for name, text in texts.items()}
 
 

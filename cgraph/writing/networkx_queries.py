@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import networkx
 
 LABELS = ("tags", "roles", "lines")
+_name = partial(check_name, "a node")
 
 
 def to_networkx(graph: Graph) -> networkx.MultiDiGraph:
@@ -152,10 +153,6 @@ def _read(key: object, data: Mapping[str, Any], name: str, kind: Callable[[Any],
         return kind(data[name])
     except (TypeError, ValueError) as error:
         raise GraphError(f"attribute {name!r} of node {key!r}, {data[name]!r:.60}, cannot be read: {error}") from None
-
-
-def _name(name: str) -> str:
-    return check_name("a node", name)
 
 
 def _text(value: object) -> str:

@@ -15,10 +15,9 @@ from ...util.words import counted
 from ...writing.structure_hash import structure_hash
 from ..explicit_method import Tableau, checked_methods
 from .c_errors import POINTS, Box, Errors, checked_box, largest_errors
+from .c_functions import comment, declaration, functions, steps
 from .c_identifiers import check_function_name, distinct
 from .c_numbers import NUMBERS, CNumbers
-from .c_statements import comment, functions
-from .c_steps import declaration, steps
 
 _HEADER = """\
 /* {name}: {counts}, written by cgraph. Units are those of the equations behind it. */
@@ -71,24 +70,16 @@ _RESTRICT = """\
 # it can tell an argument, behind a comparison for one, it computes a function itself, and rounds otherwise than the
 # library; not so under rounding-math.
 _CONTRACT = """\
-/* {meaning} */
+/* {} */
 #if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize ("fp-contract={gcc}", "rounding-math")
+#pragma GCC optimize ("fp-contract={}", "rounding-math")
 #else
-#pragma STDC FP_CONTRACT {standard}
+#pragma STDC FP_CONTRACT {}
 #endif
 """
-_ROUNDING = {
-    False: {
-        "meaning": "Every product and every sum is rounded by itself: no fused multiply-add.",
-        "gcc": "off",
-        "standard": "OFF",
-    },
-    True: {
-        "meaning": "A product and the sum that it goes into may be rounded once: fused multiply-add.",
-        "gcc": "fast",
-        "standard": "ON",
-    },
+_ROUNDING = {  # {fma: meaning, word of GCC, word of the standard}
+    False: ("Every product and every sum is rounded by itself: no fused multiply-add.", "off", "OFF"),
+    True: ("A product and the sum that it goes into may be rounded once: fused multiply-add.", "fast", "ON"),
 }
 
 
@@ -211,7 +202,7 @@ def to_c(
     ranges = checked_box(graph, box) if single else {}
     places = [f"{name.upper()}_IN_{word}" for word in distinct(input_names)]
     results = [f"{name.upper()}_OUT_{word}" for word in distinct(list(outputs))]
-    contract = _CONTRACT.format(**_ROUNDING[require_flag("fma", fma)])
+    contract = _CONTRACT.format(*_ROUNDING[require_flag("fma", fma)])
     text = functions(
         name,
         graph.nodes,

@@ -13,8 +13,7 @@ from ...util.words import counted
 from ...writing.networkx_queries import minimum_cut
 from ...writing.source_lines import lines_text
 from ..names import Name, Names, joined
-from ..paths import best_paths
-from ..reachability import ancestors, between, descendants
+from ..paths import ancestors, best_paths, between, descendants
 from .finding import Finding
 
 Group = Name | Sequence[Name]

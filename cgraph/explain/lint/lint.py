@@ -16,7 +16,7 @@ from ...util.require import require_graph, require_kind, require_mapping, requir
 from ...util.words import counted
 from ..edge_partials import Point
 from ..names import Name, Names, joined
-from ..reachability import ancestors
+from ..paths import ancestors
 from .cancellation import cancellations, rounded
 from .finding import Finding
 from .independence import Group, check_independence
@@ -235,11 +235,10 @@ def _is_signed(node: Node) -> bool:
 def _unused_inputs(names: Names) -> list[Finding]:
     """The inputs that no output depends on."""
     used = set(names.graph.nodes)
-    unused = [node for node in names.graph.inputs if node not in used]
-    called = {node: names.text(node) for node in unused}
+    unused = {node: names.text(node) for node in names.graph.inputs if node not in used}
     return [
         Finding("unused input", f"Nothing uses the input {name}.", (node,), data={"input": name})
-        for node, name in called.items()
+        for node, name in unused.items()
     ]
 
 

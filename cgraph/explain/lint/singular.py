@@ -27,8 +27,13 @@ def _widened(low: float, high: float) -> Interval:
 
 
 def singular_nodes(names: Names, box: Box) -> list[Finding]:
-    """The operations that could meet a singular point of theirs for inputs in the box."""
-    bounds = intervals(names.graph.nodes, _given(names, box))
+    """The operations that could meet a singular point of theirs for inputs in the box.
+
+    Raises GraphError for an unknown input, ValueError for what is no interval.
+    """
+    known = names.inputs_of("box", require_mapping("box", box, "input: interval"))
+    given = {name: box_interval(names.shown(name), value) for name, value in known.items()}
+    bounds = intervals(names.graph.nodes, given)
     findings = []
     for node in names.graph.nodes:
         reason = singular_at(columns(node.op), [bounds[arg] for arg in node.args]) if node.args else None
@@ -47,9 +52,3 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
             text = f"{names.line(node)}: {reason}" + (f"; {within}." if within else ".")
             findings.append(Finding("singular", text, (node,), data=data))
     return findings
-
-
-def _given(names: Names, box: Box) -> dict[str, Interval]:
-    """The box by the graph's names. Raises GraphError for an unknown input, ValueError for what is no interval."""
-    known = names.inputs_of("box", require_mapping("box", box, "input: interval"))
-    return {name: box_interval(names.shown(name), value) for name, value in known.items()}

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...codegen.bound_call import bound
-from ...codegen.c_entry import CEntry, c_entry
-from ...codegen.disk_cache import open_cache
+from ...codegen.bound_call import CEntry, bound, c_entry
+from ...codegen.disk_cache import cache_folder
 from ...codegen.llvm_engine import MissingFunctionError
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
@@ -223,8 +222,7 @@ class Compiled(BoundFunction):
         >>> cg.compile(cg.Graph([x], {"y": x * x})).jacobian([[1.0], [2.0], [3.0]]).ravel().tolist()
         [2.0, 4.0, 6.0]
         """
-        chosen = None if wrt is None else self._chosen(wrt)
-        return self._matrix(self._derivatives.jacobian(chosen), self._points(x), sparse, threads)
+        return self._matrix(self._derivatives.jacobian(self._chosen(wrt)), self._points(x), sparse, threads)
 
     def hessian(
         self,
@@ -325,8 +323,7 @@ class Compiled(BoundFunction):
     def _products(
         self, x: ArrayLike, name: str, directions: ArrayLike, wrt: Inputs, threads: int | None, *, reverse: bool
     ) -> Array:
-        points, rows = self._points(x), real_array(name, directions)
-        chosen = None if wrt is None else self._chosen(wrt)
+        points, rows, chosen = self._points(x), real_array(name, directions), self._chosen(wrt)
         width, found = self.n_in if chosen is None else len(chosen), self.n_out
         if reverse:
             width, found = found, width
@@ -454,7 +451,7 @@ def compile(
         )
     if backend == "llvm" or (backend == "auto" and not large):
         try:
-            ready = partial(NativeRunner, fast=fast, fma=fma, cache=open_cache(kept))
+            ready = partial(NativeRunner, fast=fast, fma=fma, cache=cache_folder(kept))
             return Compiled(graph, backend, options, ready, ready)
         except (ImportError, MissingFunctionError):
             if backend == "llvm":

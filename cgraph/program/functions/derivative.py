@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike
 
 from ...autodiff.coloring import NONE, jacobian_coloring, star_coloring
 from ...autodiff.direction_split import DirectionSplit, direction_split
-from ...autodiff.jacobian_entries import entry_graph, written_sizes
 from ...autodiff.products import forward_products, reverse_products
-from ...autodiff.sparsity import Indices, Indices32, Pattern, full, pattern, symmetric
+from ...autodiff.sparsity import Indices, Indices32, Pattern, entry_graph, full, pattern, symmetric, written_sizes
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
 from ...core.graph import Graph

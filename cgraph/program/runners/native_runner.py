@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +33,6 @@ from .runner import Record, Runner, Start
 
 if TYPE_CHECKING:
     from ...codegen.batch_ir import Batch
-    from ...codegen.disk_cache import Cache
     from .batch_code import BatchCode, LaneCode
 
 BACKENDS = ("auto", "python", "llvm")
@@ -49,7 +49,7 @@ class NativeRunner(Runner):
 
     vectors = 17
 
-    def __init__(self, program: Program, *, fast: bool = False, fma: bool = True, cache: Cache | None = None) -> None:
+    def __init__(self, program: Program, *, fast: bool = False, fma: bool = True, cache: Path | None = None) -> None:
         host = llvm.host()
         super().__init__(program, host.lanes)
         self.lanes = host.lanes

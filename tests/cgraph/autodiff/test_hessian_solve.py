@@ -13,9 +13,8 @@ import cgraph as cg
 from cgraph import GraphError
 from cgraph.autodiff.hessian_solve import solve_nodes, solve_tangents
 from cgraph.autodiff.jacobian import hessian_nodes
-from cgraph.autodiff.ldl_solve import ldl_solve
 from cgraph.autodiff.rotation_pairs import rotations
-from cgraph.autodiff.symmetric_elimination import SingularError
+from cgraph.autodiff.symmetric_elimination import SingularError, ldl_solve
 from cgraph.core.forward import tangents
 from cgraph.core.traversal import topological
 from tests.cgraph.engines import ENGINES

@@ -43,14 +43,14 @@ class Kept:
     """Code that is kept in a folder, and how often it was made."""
 
     def __init__(self, folder):
-        self.cache, self.made = cache.Cache(folder), 0
+        self.folder, self.made = folder, 0
 
     def __call__(self, recipe="a recipe", code=CODE):
         def make():
             self.made += 1
             return code
 
-        return self.cache.fetch(recipe, make)
+        return cache.cached_code(self.folder, recipe, make)
 
 
 def flipped(position):
@@ -184,11 +184,11 @@ def test_a_folder_that_cannot_be_written_still_gives_what_it_has(folder, monkeyp
 WORKER = """
 import sys
 from pathlib import Path
-from cgraph.codegen.disk_cache import Cache
+from cgraph.codegen.disk_cache import cached_code
 print("ready", flush=True)
 sys.stdin.readline()
 codes = [bytes([k]) * 10_000 for k in range(200)]
-print([Cache(Path(sys.argv[1])).fetch(f"{k}", lambda: code) for k, code in enumerate(codes)] == codes)
+print([cached_code(Path(sys.argv[1]), f"{k}", lambda: code) for k, code in enumerate(codes)] == codes)
 """
 
 
@@ -261,9 +261,9 @@ def fewer_features():
 
 
 def test_other_code_has_other_entries(folder):
-    llvm.host().compile(TEXT, (), 1, cache.Cache(folder))
+    llvm.host().compile(TEXT, (), 1, folder)
     for count, (name, (other, version, nodes)) in enumerate(HOSTS.items(), 2):
-        llvm.Host(other, version).compile(TEXT, (), nodes, cache.Cache(folder))
+        llvm.Host(other, version).compile(TEXT, (), nodes, folder)
         assert len(entries(folder)) == count, name
     cg.compile(graph(), "llvm", cache=folder).batch(POINTS)
     for count, (name, options) in enumerate(OPTIONS.items(), 2):
