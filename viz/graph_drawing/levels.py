@@ -1,7 +1,5 @@
 """Graphs by depth: a row for each length of the longest way from the leaves, as nodes and lines, or as silhouettes."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Contents of a model's page: its equations, their inputs along a motion, places of joints, shares of torques."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Classes of the nodes of equations of motion: of a formulation, needed or not; of both forms, what they serve."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable
 

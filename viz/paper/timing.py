@@ -1,7 +1,5 @@
 """Figure 6 and Table 1: the time of one evaluation of each formulation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple
