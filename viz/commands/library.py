@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from ..pages import pruning_page, stability_page, work_precision_page
     from ..pages.document import check_folder, document_files
     from ..pages.html import html_target
-    from ..paper.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_agreement, form_sizes, size_of
+    from ..paper.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_agreement, form_sizes
     from ..paper.paper import paper
     from ..plots.plot import check_can_plot
     from ..typed import typed_page

@@ -23,7 +23,7 @@ from .arguments import (
     unless_json,
 )
 from .command import Command
-from .compare import size_data, size_table
+from .compare import size_table
 from .points import REST, filled
 
 
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     conserved = dyn.conserved(scene) if scene.ode is None else None
     proof += f"\n{conserved}" if conserved else ""
     forms = {library.LAGRANGE: dyn.state_equation(scene), library.HAMILTON: graph} if options.momentum else {}
-    sizes = size_data(forms) if forms else {}
+    sizes = library.form_sizes(forms) if forms else {}
     proof += f"\n{size_table(sizes)}" if sizes else ""
     alone = "" if options.forward else library.tree_alone(scene)
     proof = f"{proof}\n{alone}" if alone else proof

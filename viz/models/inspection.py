@@ -143,7 +143,7 @@ def _hamilton(scene: Scene) -> list[Version]:
     """The two forms of the equations, in momenta and in velocities. Raises as `hamilton_equations` does."""
     forms = both_forms(scene)
     hamilton, system, sizes = forms[HAMILTON], scene.system, form_sizes(forms)
-    depth = {name: counts.depth for name, counts in sizes.items()}
+    depth = {name: size["depth"] for name, size in sizes.items()}
     about = (
         "Rates of coordinates and momenta. The velocities are solved from the momenta, "
         f"{counted(depth[VELOCITIES_ALONE], 'operation')} deep; the rates of the momenta stand on them, "
