@@ -161,11 +161,6 @@ def place(text: str) -> Path:
     return Path(text)
 
 
-def listed(text: str) -> tuple[str, ...]:
-    """Names between commas, for argparse."""
-    return tuple(filter(None, text.split(",")))
-
-
 def _spring(text: str) -> tuple[float, float]:
     """Stiffness and damping, for argparse."""
     stiffness, comma, damping = text.partition(",")

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from ..paper.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_agreement, form_sizes
     from ..paper.paper import paper
     from ..plots.plot import check_can_plot
-    from ..typed import typed_page
+    from ..typed.text_page import typed_page
 
 if not TYPE_CHECKING:
     __getattr__, __dir__ = doors(__name__, __file__)

@@ -15,19 +15,7 @@ import dynamics as dyn
 from cgraph import _shared
 
 from . import library
-from .arguments import (
-    IN_PYTHON,
-    READING,
-    answer,
-    listed,
-    number,
-    place,
-    positive,
-    reading,
-    reads_files,
-    start,
-    unless_json,
-)
+from .arguments import IN_PYTHON, READING, answer, number, place, positive, reading, reads_files, start, unless_json
 from .command import Command, say
 
 CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
@@ -97,6 +85,11 @@ def run(options: argparse.Namespace) -> int | None:
         return _stability(options)
     (_curves if kind == CURVES else _pruning)(options)
     return None
+
+
+def listed(text: str) -> tuple[str, ...]:
+    """Names between commas, for argparse."""
+    return tuple(filter(None, text.split(",")))
 
 
 def _locked(text: str) -> tuple[str, float]:

@@ -6,7 +6,7 @@ from py_mini_racer import MiniRacer
 
 from tests.page_script import DOCUMENT
 from viz.inspector.page import scripts
-from viz.typed import box
+from viz.typed.text_page import box
 
 # What a browser has and V8 has not, as far as the box asks for it.
 BROWSER = """
