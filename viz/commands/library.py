@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..graph_drawing.dot import to_dot
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
     from ..lessons.lesson import LESSONS, lesson
-    from ..models.causes import CauseTable, Slopes
+    from ..models.causes import CauseInAll, Causes, CauseTable, Slopes
     from ..models.drawing import judged_drawing
     from ..models.driven_motion import driven
     from ..models.equations import model_equations

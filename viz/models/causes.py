@@ -171,8 +171,8 @@ class CauseTable:
 
         Raises GraphError for an input that is none.
         """
-        where = {name: f"{output}_{k}" for k, name in enumerate(self.table.rows)}
-        chosen = {name: self.table.graph.outputs[where[name]] for name in rows or self.table.rows}
+        every = {name: self.table.graph.outputs[f"{output}_{k}"] for k, name in enumerate(self.table.rows)}
+        chosen = {name: every[name] for name in rows or every}
         own = Names(self.table.graph, self.called)
         what, unit = self.names.shown(output), self.units.get(output, "")
         whole = self.graph.outputs[output]

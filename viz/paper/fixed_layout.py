@@ -152,7 +152,7 @@ def _layout(views: Sequence[View]) -> tuple[dict[str, Size], dict[tuple[str, str
             sizes[place] = max(wide, shape.size[0]), max(high, shape.size[1])
     number = {place: i for i, place in enumerate(sizes)}
     pairs = list(dict.fromkeys([pair for view in views for pair in view.arrows]))
-    (found,) = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])
+    (found,) = positions((tuple(sizes.values()), tuple([(number[a], number[b]) for a, b in pairs])))
     lines = {(a, b): found.lines[number[a], number[b]] for a, b in pairs}
     return dict(zip(sizes, found.centers, strict=True)), lines, found.size
 
