@@ -60,27 +60,23 @@ def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
     each = [f"{title} {size['nodes']} nodes, {size['depth']} deep" for title, size in order_sizes.items()]
     towers = f"Four towers over one scale of depth: {'; '.join(each)}."
     silhouettes = silhouettes_svg(orders)
+    rows = [
+        (f"{name}, {title.partition(':')[0]}", *map(str, forms[form].values()))
+        for name, forms in sizes.items()
+        for form, title in TITLES.items()
+    ]
     blocks: list[Block] = [
         Paragraph(_answer(sizes[ARM]), point=True),
         drawn("fig7a", spring, _caption("7a", SPRING, sizes[SPRING]), "auto", _seen(SPRING, sizes[SPRING])),
         Picture("", to_adaptive(legend), "The colors of Figure 7.", "auto"),
         drawn("fig7b", arm, _caption("7b", ARM, sizes[ARM]), "100%", _seen(ARM, sizes[ARM])),
         Paragraph(_cause(sizes[ARM])),
-        Table("Sizes of both forms", ("", *SIZES), _rows(sizes), file="fig7"),
+        Table("Sizes of both forms", ("", *SIZES), rows, file="fig7"),
         Paragraph(_remedy(order_sizes)),
         drawn("fig7c", silhouettes, SILHOUETTES, "100%", towers),
     ]
     data = sizes | {f"a planar chain of {LINKS}": order_sizes}
     return Part("forms", "Figure 7: both forms by depth", blocks, {"forms": data})
-
-
-def _rows(sizes: Mapping[str, Forms]) -> list[tuple[str, ...]]:
-    return [
-        (f"{name}, {TITLES[form].partition(':')[0]}", *map(str, size.values()))
-        for name, forms in sizes.items()
-        for form, size in forms.items()
-        if form in TITLES
-    ]
 
 
 def _caption(number: str, what: str, forms: Forms) -> str:
@@ -94,9 +90,8 @@ def _caption(number: str, what: str, forms: Forms) -> str:
 
 def _seen(what: str, forms: Forms) -> str:
     each = [
-        f"{TITLES[form]} {size['nodes']} nodes and {size['edges']} edges, {size['depth']} deep and {size['width']} wide"
-        for form, size in forms.items()
-        if form in TITLES
+        "{} {nodes} nodes and {edges} edges, {depth} deep and {width} wide".format(title, **forms[form])
+        for form, title in TITLES.items()
     ]
     return f"Two graphs of {what} side by side, inputs at the bottom: {'; '.join(each)}."
 
