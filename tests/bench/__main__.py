@@ -1,7 +1,5 @@
 """`python -m tests.bench`: our speed beside that of other software, on the same tasks in turns; and other figures."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
