@@ -1,7 +1,5 @@
 """The command line `cgraph`: one command, its exit status, and a line for an error."""
 
-from __future__ import annotations
-
 import io
 import os
 import signal

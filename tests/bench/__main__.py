@@ -1,7 +1,5 @@
 """`python -m tests.bench`: our speed beside that of other software, on the same tasks in turns; and other figures."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -11,7 +9,8 @@ from typing import Any
 
 from dynamics.experiments.timing import machine
 from dynamics.integrators import METHODS
-from viz.commands.arguments import IN_PYTHON, READING, listed, positive, reading, reads_files, whole
+from viz.commands.arguments import IN_PYTHON, READING, positive, reading, reads_files, whole
+from viz.commands.report import listed
 
 from .benches import BENCHES, SPEED, Bench
 from .motions.motion_scenes import MOTIONS

@@ -64,8 +64,7 @@ def run(options: argparse.Namespace) -> int:
     say(f"{scene.name}: drawing {library.frames(max(each.t[-1] for each in motions.values()), options.speed)} frames")
     title = f"{scene.name}: the gray motion is wanted" if options.driven else ""
     film = library.animate(
-        scene, motions, wanted=wanted, marked=marked, speed=options.speed, dark=options.dark,
-        title=title,
-    )  # fmt: skip
+        scene, motions, wanted=wanted, marked=marked, speed=options.speed, dark=options.dark, title=title
+    )
     answer(f"{options.out}: {len(film) / 1e3:.0f} kB", {options.out: film})
     return 0 if all([each.stats.success for each in motions.values()]) else 1

@@ -120,8 +120,9 @@ def answer(
         say(f"warning: no browser was found that opens {show}")
 
 
-def takes_equations(command: argparse.ArgumentParser) -> None:
-    """The arguments that `equations_of` reads, of which one may be given."""
+def takes_equations(command: Command) -> None:
+    """The arguments that `scene_of` and `equations_of` read, of which one may say what equations."""
+    takes_a_scene(command)
     which = command.add_mutually_exclusive_group()
     which.add_argument(
         "--formulation",
@@ -159,11 +160,6 @@ def place(text: str) -> Path:
     if not text:
         raise argparse.ArgumentTypeError("expected the name of a file or folder, got ''")
     return Path(text)
-
-
-def listed(text: str) -> tuple[str, ...]:
-    """Names between commas, for argparse."""
-    return tuple(filter(None, text.split(",")))
 
 
 def _spring(text: str) -> tuple[float, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +16,7 @@ from . import library
 from .arguments import answer, box, place, scene_of, takes_a_scene
 from .command import Command
 
-EQUATIONS: dict[str, Callable[[dyn.scenes.Scene], cg.Graph]] = {
-    "forward_dynamics": lambda scene: dyn.forward_dynamics(scene),
-    "inverse_dynamics": lambda scene: dyn.inverse_dynamics(scene),
-    "state_equation": lambda scene: dyn.state_equation(scene),
-    "mass_matrix": lambda scene: dyn.mass_matrix(scene),
-    "energy": lambda scene: dyn.energy(scene),
-}  # each is loaded when it is called
+EQUATIONS = ("forward_dynamics", "inverse_dynamics", "state_equation", "mass_matrix", "energy")  # of `dynamics`
 SUFFIXES = {"c": ".c", "js": ".mjs", "python": ".py"}
 
 
@@ -37,7 +30,7 @@ def add(parser: Command) -> None:
     for name, about in (languages | {"python": "a Python function of a list"}).items():
         language.add_argument(f"--{name}", dest="language", action="store_const", const=name, help=about)
     parser.add_argument(
-        "--what", choices=tuple(EQUATIONS), help="default: forward_dynamics; of a first-order system state_equation"
+        "--what", choices=EQUATIONS, help="default: forward_dynamics; of a first-order system state_equation"
     )
     parser.add_argument(
         "--out", type=place, help="file to write, in place of standard output: .c (and .h), .mjs or .py"
@@ -69,7 +62,7 @@ def run(options: argparse.Namespace) -> None:
         _shared.check_writable(out)
     scene = scene_of(options)
     what = options.what or ("forward_dynamics" if scene.ode is None else "state_equation")
-    graph = EQUATIONS[what](scene)
+    graph: cg.Graph = getattr(dyn, what)(scene)
     name = re.sub("[^A-Za-z0-9_]", "_", scene.name) if out is None else out.stem
     methods = library.TABLEAUS if what == "state_equation" else None
     if options.language == "js":

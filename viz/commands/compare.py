@@ -104,22 +104,18 @@ def _sizes(options: argparse.Namespace, scene: dyn.scenes.Scene) -> None:
 
 def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, _shared.Json], str]:
     """Sizes of both forms, and how far they agree at a state, as data and as text."""
-    sizes, apart = size_data(graphs), library.form_agreement(scene, graphs, filled(graphs[library.LAGRANGE], scene, {}))
+    sizes, at = library.form_sizes(graphs), filled(graphs[library.LAGRANGE], scene, {})
+    apart = library.form_agreement(scene, graphs, at)
     agreement = (
-        f"At a state, velocities differ by {apart.velocities:.1g}, and p_dot from dp/dt along the accelerations by "
-        f"{apart.momentum_rates:.1g}, relative to the largest."
+        f"At a state, velocities differ by {apart['velocities']:.1g}, and p_dot from dp/dt along the accelerations by "
+        f"{apart['momentum_rates']:.1g}, relative to the largest."
     )
-    told = {name: each if math.isfinite(each) else None for name, each in apart._asdict().items()}
+    told = {name: each if math.isfinite(each) else None for name, each in apart.items()}
     return {"sizes": sizes, "agreement": told}, f"{size_table(sizes)}\n{agreement}"
 
 
-def size_data(forms: Mapping[str, cg.Graph]) -> dict[str, dict[str, int]]:
-    """{name of a form: {"nodes": .., "edges": .., "depth": .., "width": ..}}.  forms: as of `both_forms`."""
-    return {name: library.size_of(counts) for name, counts in library.form_sizes(forms).items()}
-
-
 def size_table(sizes: Mapping[str, Mapping[str, int]]) -> str:
-    """A line for each form of `size_data`, under a header."""
+    """A line for each form of `form_sizes`, under a header."""
     words = {
         library.LAGRANGE: f"{library.LAGRANGE}, of (q, qd)",
         library.HAMILTON: f"{library.HAMILTON}, of (q, p), p = dL/dqd",

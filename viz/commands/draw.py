@@ -10,7 +10,7 @@ import dynamics as dyn
 from cgraph import _shared
 
 from . import library
-from .arguments import answer, collapsed, equations_of, place, scene_of, takes_a_scene, takes_equations
+from .arguments import answer, collapsed, equations_of, place, scene_of, takes_equations
 from .command import Command
 
 PICTURES = (".svg", ".png")
@@ -19,7 +19,6 @@ KINDS = (*PICTURES, ".dot", ".txt")
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    takes_a_scene(parser)
     takes_equations(parser)
     parser.add_argument(
         "--inertial-term",

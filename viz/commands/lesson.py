@@ -10,12 +10,10 @@ from . import library
 from .arguments import answer, may_open, scene_of, takes_a_scene
 from .command import Command, say
 
-DEFAULT = "two_link"
-
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    takes_a_scene(parser, default=DEFAULT)
+    takes_a_scene(parser, default="two_link")
     parser.names["subjects"] = lambda: [
         f"{name} ({each.title}, {each.minutes} minutes)" for name, each in library.LESSONS.items()
     ]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..graph_drawing.dot import to_dot
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
     from ..lessons.lesson import LESSONS, lesson
-    from ..models.causes import CauseTable, Slopes
+    from ..models.causes import CauseInAll, Causes, CauseTable, Slopes
     from ..models.drawing import judged_drawing
     from ..models.driven_motion import driven
     from ..models.equations import model_equations
@@ -44,10 +44,10 @@ if TYPE_CHECKING:
     from ..pages import pruning_page, stability_page, work_precision_page
     from ..pages.document import check_folder, document_files
     from ..pages.html import html_target
-    from ..paper.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_agreement, form_sizes, size_of
+    from ..paper.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_agreement, form_sizes
     from ..paper.paper import paper
     from ..plots.plot import check_can_plot
-    from ..typed import typed_page
+    from ..typed.text_page import typed_page
 
 if not TYPE_CHECKING:
     __getattr__, __dir__ = doors(__name__, __file__)

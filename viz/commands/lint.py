@@ -18,18 +18,16 @@ from .arguments import (
     point,
     scene_of,
     state_names,
-    takes_a_scene,
     takes_equations,
     unless_json,
 )
 from .command import Command
-from .compare import size_data, size_table
+from .compare import size_table
 from .points import REST, filled
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    takes_a_scene(parser)
     takes_equations(parser)
     parser.add_argument(
         "--box",
@@ -65,23 +63,20 @@ def run(options: argparse.Namespace) -> int:
     )
     # A path from qd to q is the finding of equations that nothing else is known of; of a formulation the verdict tells.
     faults = [each for each in report.findings if verdict is None or each.kind != "dependence"]
-    proof = lint_text(report, verdict)
-    proof = proof if scene.ode is None else f"Holds: equations of first order have no velocities.\n{report}"
     ok = not faults and not (verdict and verdict.differs)
     conserved = dyn.conserved(scene) if scene.ode is None else None
-    proof += f"\n{conserved}" if conserved else ""
     forms = {library.LAGRANGE: dyn.state_equation(scene), library.HAMILTON: graph} if options.momentum else {}
-    sizes = size_data(forms) if forms else {}
-    proof += f"\n{size_table(sizes)}" if sizes else ""
+    sizes = library.form_sizes(forms) if forms else {}
     alone = "" if options.forward else library.tree_alone(scene)
-    proof = f"{proof}\n{alone}" if alone else proof
+    first_order = "" if scene.ode is None else "Holds: equations of first order have no velocities."
+    told = [first_order, lint_text(report, verdict), str(conserved or ""), size_table(sizes) if sizes else "", alone]
     data = {"scene": scene.name, "equations": what, "of_the_tree": bool(alone)} | report.to_dict()
     data |= {"conserved": list(conserved.quantities) if conserved else [], "ok": ok}
     data |= {"verdict": verdict.to_dict()} if verdict else {}
     data |= {"sizes": sizes} if sizes else {}
     answer_and_draw(
         options,
-        unless_json(options, data, proof),
+        unless_json(options, data, "\n".join(filter(None, told))),
         graph,
         scene,
         marked=(verdict.nodes if verdict else frozenset())

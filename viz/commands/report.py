@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,19 +14,7 @@ import dynamics as dyn
 from cgraph import _shared
 
 from . import library
-from .arguments import (
-    IN_PYTHON,
-    READING,
-    answer,
-    listed,
-    number,
-    place,
-    positive,
-    reading,
-    reads_files,
-    start,
-    unless_json,
-)
+from .arguments import IN_PYTHON, READING, answer, number, place, positive, reading, reads_files, start, unless_json
 from .command import Command, say
 
 CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
@@ -99,27 +86,16 @@ def run(options: argparse.Namespace) -> int | None:
     return None
 
 
+def listed(text: str) -> tuple[str, ...]:
+    """Names between commas, for argparse."""
+    return tuple(filter(None, text.split(",")))
+
+
 def _locked(text: str) -> tuple[str, float]:
     body, equals, at = text.rpartition("=")
     if not (equals and body):
         raise argparse.ArgumentTypeError(f"expected a body and a coordinate, BODY=AT, got {text!r}")
     return body, number(at)
-
-
-@contextmanager
-def _exact_motions(out: Path | None) -> Iterator[tuple[Path, Callable[[], dict[Path, str | bytes]]]]:
-    """A folder with the exact motions that are kept, and the files of those that come, for when the report is whole."""
-    kept = None if out is None else out / "exact"
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        for path in kept.glob("*.json") if kept else ():
-            shutil.copy(path, folder)
-
-        def new() -> dict[Path, str | bytes]:
-            files = {kept / path.name: path.read_bytes() for path in folder.iterdir()} if kept else {}
-            return {path: text for path, text in files.items() if not path.is_file() or path.read_bytes() != text}
-
-        yield folder, new
 
 
 def _curves(options: argparse.Namespace) -> None:
@@ -131,14 +107,17 @@ def _curves(options: argparse.Namespace) -> None:
     if options.out is not None:
         library.check_can_plot()
     found, lines, files = [], [], dict[Path, str | bytes]()
-    with _exact_motions(options.out) as (folder, new):
+    kept = None if options.out is None else options.out / "exact"
+    with TemporaryDirectory() as folder:  # of exact motions, kept and new, until the report is whole
+        for path in kept.glob("*.json") if kept else ():
+            shutil.copy(path, folder)
         for name in options.scenes:
             report = library.work_precision.work_precision(
                 name,
                 methods=options.methods or tuple(dyn.METHODS),
                 turns=3 if options.quick else 9,
                 limit=0.03 if options.quick else library.work_precision.LIMIT,
-                folder=folder,
+                folder=Path(folder),
                 options=chosen,
                 say=say,
             )
@@ -149,7 +128,9 @@ def _curves(options: argparse.Namespace) -> None:
                 files |= (written := library.document_files(options.out, content["name"], document, content, rows))
                 points = sum(len(each.points) for each in report.curves)
                 lines.append(f"{[*written][-1]}: {len(report.curves)} integrators, {points} points")
-        answer(unless_json(options, found, "\n".join(lines)), files | new(), folder=options.out)
+        exact = {kept / path.name: path.read_bytes() for path in Path(folder).iterdir()} if kept else {}
+        files |= {path: text for path, text in exact.items() if not path.is_file() or path.read_bytes() != text}
+        answer(unless_json(options, found, "\n".join(lines)), files, folder=options.out)
 
 
 def _stability(options: argparse.Namespace) -> int:

@@ -17,19 +17,16 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Print two lines a scene."""
-    rows = list[dict[str, Any]]()
-    for name in dyn.scenes.names():
-        scene = dyn.scenes.load(name)
-        inverse, forward = dyn.inverse_dynamics(scene).counts(), dyn.forward_dynamics(scene).counts()
-        rows.append(
-            {
-                "name": name,
-                "about": scene.about,
-                "coordinates": scene.system.n,
-                "inverse_nodes": inverse.nodes,
-                "forward_nodes": forward.nodes,
-            }
-        )
+    rows: list[dict[str, Any]] = [
+        {
+            "name": scene.name,
+            "about": scene.about,
+            "coordinates": scene.system.n,
+            "inverse_nodes": len(dyn.inverse_dynamics(scene).nodes),
+            "forward_nodes": len(dyn.forward_dynamics(scene).nodes),
+        }
+        for scene in map(dyn.scenes.load, dyn.scenes.names())
+    ]
     lines = [
         f"{row['name']:16} {row['about']}\n{'':16} coordinates: {row['coordinates']}, inverse dynamics "
         f"{_shared.counted(row['inverse_nodes'], 'node')}, "

@@ -18,6 +18,7 @@ METHOD = "dop853"
 SHOWN = 12  # states that the summary names
 SPANS = 4  # of slides on a surface that it tells
 MOST_ROWS = 1_000_000
+UNLIMITED = (-math.inf, math.inf)
 
 
 def add(parser: Command) -> None:
@@ -111,11 +112,9 @@ def _surfaces(run: dyn.Trajectory) -> dict[str, dict[str, Any]]:
 
 def _limited(scene: dyn.Scene) -> dict[str, dict[str, tuple[float, float]]]:
     """{"position" or "velocity": {coordinate: the ends of its limit}} of those that are limited."""
-    kinds = ("position", "velocity")
-    ends = {kind: {name: getattr(each, kind) for name, each in scene.limits.items()} for kind in kinds}
     return {
-        kind: {name: pair for name, pair in found.items() if pair != (-math.inf, math.inf)}
-        for kind, found in ends.items()
+        kind: {name: ends for name, each in scene.limits.items() if (ends := getattr(each, kind)) != UNLIMITED}
+        for kind in ("position", "velocity")
     }
 
 

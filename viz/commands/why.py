@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
 import cgraph as cg
 import dynamics as dyn
@@ -18,15 +17,11 @@ from .arguments import (
     may_draw_and_print,
     point,
     scene_of,
-    takes_a_scene,
     takes_equations,
     unless_json,
 )
 from .command import Command
 from .points import REST, SHOWN, filled, point_text
-
-if TYPE_CHECKING:
-    from ..models.causes import CauseInAll, Causes, CauseTable, Slopes
 
 KINDS = {"jump": "jumps, ", "kink": "kinks, the slope of ", "smooth": "no change near this state"}
 PATHS = 5  # that are listed and drawn where nothing else is said
@@ -34,7 +29,7 @@ PATHS = 5  # that are listed and drawn where nothing else is said
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    takes_a_scene(parser)
+    takes_equations(parser)
     parser.add_argument(
         "output",
         metavar="WHAT",
@@ -43,7 +38,6 @@ def add(parser: Command) -> None:
     )
     parser.add_argument("input", metavar="INPUT", nargs="?", help="why it depends on this, such as q2, or q.hip")
     parser.late = "output", "input"
-    takes_equations(parser)
     parser.add_argument(
         "--nan", action="store_true", help="where a value that is not finite, or a derivative by INPUT, comes from"
     )
@@ -76,7 +70,7 @@ def run(options: argparse.Namespace) -> int | None:
     table = None if verdict is None else library.CauseTable(scene, graph, verdict.formulation, at)
     output = (table and table.named(options.output)) or names.meant(options.output)
     state, alone = f"At {_state(options, names, at)}:", ""
-    asked: Causes | CauseInAll | Slopes
+    asked: library.Causes | library.CauseInAll | library.Slopes
     if output in graph.outputs or output in names.by_name or table is None:
         if options.input is not None:
             _dependence(options, scene, names, verdict, table, output, at)
@@ -103,7 +97,7 @@ def _dependence(
     scene: dyn.scenes.Scene,
     names: library.Names,
     verdict: dyn.Verdict | None,
-    table: CauseTable | None,
+    table: library.CauseTable | None,
     output: str,
     at: dict[str, float],
 ) -> None:

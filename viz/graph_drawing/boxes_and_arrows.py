@@ -94,11 +94,11 @@ class Plan:
             attributes = {"id": f"e{tail.removeprefix('n')}-{head.removeprefix('n')}", "edgetooltip": about}
             if len(edges) > 1:
                 attributes["label"] = f"×{len(edges)}"
-            yield Arrow(tail, head, {**attributes, **_line(mark)})
+            yield tail, head, {**attributes, **_line(mark)}
         for i, _, node in self.outputs:
             number = self.number[node]
             tail = self.part.get(node, f"n{number}") if node.value is None else f"n{number}-o{i}"
-            yield Arrow(tail, f"o{i}", {"id": f"e{number}-o{i}", **_line(self.marks.get(node))})
+            yield tail, f"o{i}", {"id": f"e{number}-o{i}", **_line(self.marks.get(node))}
 
     def _told(self, node: Node) -> str:
         """Name of a node in a tooltip: the name of its part, the %number of the listing, its name or its value."""
@@ -163,7 +163,7 @@ class Plan:
         }
         if op.arity > 1 and not op.commutative:
             attributes["headlabel"] = str(edge.slot + 1)
-        return Arrow(self._tail(edge), f"n{target}", {**attributes, **_line(self._mark_of(edge))})
+        return self._tail(edge), f"n{target}", {**attributes, **_line(self._mark_of(edge))}
 
 
 def _look(look: Attributes, heavy: bool) -> Attributes:

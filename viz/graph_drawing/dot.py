@@ -125,8 +125,8 @@ def to_dot(
     draw_boxes(drawing, boxes)
     if legend is not False:
         draw_legend(drawing, boxes, words, vertical=rankdir in ("BT", "TB"))
-    for arrow in plan.arrows():
-        drawing.edge(arrow.tail, arrow.head, **escaped(arrow.attributes))
+    for tail, head, attributes in plan.arrows():
+        drawing.edge(tail, head, **escaped(attributes))
     return drawing
 
 

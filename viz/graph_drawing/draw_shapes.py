@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from graphviz import Digraph
 
 Attributes = dict[str, str]
+Arrow = tuple[str, str, Attributes]  # from and to which shape, and its looks
 
 LEAF_SIZE = {"height": "0.34", "margin": "0.09,0.04"}
 BOX = {**LEAF_SIZE, "shape": "box", "style": "filled,rounded"}
@@ -28,15 +29,6 @@ class Box:
     kind: Paint
     attributes: Attributes
     cluster: str | None = None
-
-
-@dataclass(frozen=True)
-class Arrow:
-    """One line of the drawing."""
-
-    tail: str
-    head: str
-    attributes: Attributes
 
 
 def digraph(rankdir: str) -> Digraph:

@@ -1,12 +1,11 @@
 """Graphs by depth: a row for each length of the longest way from the leaves, as nodes and lines, or as silhouettes."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from itertools import pairwise
+from types import MappingProxyType
 
 from cgraph import Graph, Node
 from cgraph._shared import columns, counted
@@ -17,15 +16,6 @@ RING = 5.0  # pixels by which the ring of an output is wider than its node
 SWEEPS = 8  # over all rows, to bring nodes near their neighbors
 HEAD, FOOT, SIDE, FONT = 46.0, 12.0, 40.0, 13  # pixels above and below the rows and between panels, and of letters
 Place = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class LevelPanel:
-    """A graph, its title, and {words: level} of the lines across it that say what is there."""
-
-    title: str
-    graph: Graph
-    marks: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -64,24 +54,27 @@ def longest_way(graph: Graph) -> list[Node]:
     return way[::-1]
 
 
-def levels_svg(panels: Sequence[LevelPanel], scale: Scale) -> str:
-    """The panels side by side, leaves at the bottom, one of the longest ways thick.  Dark as `to_adaptive` makes it.
+def levels_svg(
+    graphs: Mapping[str, Graph], scale: Scale, marks: Mapping[str, Mapping[str, int]] = MappingProxyType({})
+) -> str:
+    """{title: graph} side by side, leaves at the bottom, a longest way thick.  Dark as `to_adaptive` makes it.
 
     Lines from constants are left out, those from inputs are faint.
+    marks: {title: {words: level}} of the lines across a graph that say what is there.
     """
-    depth = max([panel.graph.counts().depth for panel in panels])
+    depth = max([graph.counts().depth for graph in graphs.values()])
     drawn, x = list[str](), SIDE
-    for panel in panels:
-        offsets, width = _across(panel.graph, scale)
-        size = panel.graph.counts()
+    for title, graph in graphs.items():
+        offsets, width = _across(graph, scale)
+        size = graph.counts()
         sizes = f"{counted(size.nodes, 'node')}, {counted(size.edges, 'edge')}, {size.depth} deep, {size.width} wide"
-        heading, width = _heading(panel.title, sizes, x, 14.0, width)
+        heading, width = _heading(title, sizes, x, 14.0, width)
         drawn += heading
-        for words, level in panel.marks.items():
+        for words, level in marks.get(title, {}).items():
             y = scale.y(level, depth)
             drawn += [_rule(x, x + width, y, 'stroke-dasharray="5 4"'), _label(x, y - 5, words, "start")]
         at = {node: (x + left, scale.y(level, depth)) for node, (left, level) in offsets.items()}
-        drawn += [*_lines(panel.graph, at), *_nodes(panel.graph, at, scale)]
+        drawn += [*_lines(graph, at), *_nodes(graph, at, scale)]
         x += width + SIDE
     heights = {level: scale.y(level, depth) for level in range(0, depth + 1, scale.ticks)}
     return _with_rows(x - SIDE, heights, scale.y(0, depth) + scale.row / 2, drawn)
@@ -200,23 +193,23 @@ def _label(x: float, y: float, text: str, anchor: str, look: str = "") -> str:
 TICKS = 100  # levels between numbers
 
 
-def silhouettes_svg(panels: Sequence[LevelPanel], row: float = 1.0, node: float = 1.0) -> str:
-    """The panels side by side, leaves at the bottom, the same rows for all; nodes of a row by their colors.
+def silhouettes_svg(graphs: Mapping[str, Graph], row: float = 1.0, node: float = 1.0) -> str:
+    """{title: graph} side by side, leaves at the bottom, the same rows for all; nodes of a row by their colors.
 
     row, node: pixels of a level and of a node across.  Dark as `to_adaptive` makes it.
     """
-    depth = max([panel.graph.counts().depth for panel in panels])
+    depth = max([graph.counts().depth for graph in graphs.values()])
 
     def y(level: float) -> float:
         return HEAD + (depth - level) * row
 
     drawn, x = list[str](), SIDE
-    for panel in panels:
-        counts = panel.graph.counts()
+    for title, graph in graphs.items():
+        counts = graph.counts()
         sizes = f"{counted(counts.nodes, 'node')}, {counts.depth} deep"
-        heading, width = _heading(panel.title, sizes, x, y(counts.depth) - 24, node * counts.width)
+        heading, width = _heading(title, sizes, x, y(counts.depth) - 24, node * counts.width)
         drawn += heading
-        for paint, path in _rows(panel.graph, x, node).items():
+        for paint, path in _rows(graph, x, node).items():
             rows = "".join(
                 [f"M{left:.1f} {y(k + 0.5):.1f}h{wide:.1f}v{row:.1f}h{-wide:.1f}z" for k, left, wide in path]
             )

@@ -214,16 +214,12 @@ class Positions(NamedTuple):
     size: Size
 
 
-def positions(drawings: Sequence[tuple[Sequence[Size], Sequence[Line]]]) -> list[Positions]:
+@memo(64)
+def positions(*drawings: tuple[tuple[Size, ...], tuple[Line, ...]]) -> tuple[Positions, ...]:
     """Layered drawings, each of shapes (width, height) in pixels and lines that lead upward, in one run of Graphviz.
 
     Raises RenderError where there is no Graphviz, or it fails.
     """
-    return list(_positions(tuple((tuple(sizes), tuple(lines)) for sizes, lines in drawings)))
-
-
-@memo(64)
-def _positions(drawings: tuple[tuple[tuple[Size, ...], tuple[Line, ...]], ...]) -> tuple[Positions, ...]:
     root = ElementTree.fromstring(render_svg(_dot(drawings), timeout=20.0))  # noqa: S314 (Graphviz's own text)
     shapes = {group.get("id", ""): group for group in root.iter(f"{_SVG}g")}
     return tuple(_read(shapes, k, *drawing) for k, drawing in enumerate(drawings))

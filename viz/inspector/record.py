@@ -29,7 +29,7 @@ from cgraph._shared import Array, Json, columns
 from cgraph.extend import ADJOINT, PRIMAL, TANGENT
 
 from .. import theme
-from ..graph_drawing.render import Positions, RenderError, positions
+from ..graph_drawing.render import Line, Positions, RenderError, positions
 from ..pages.operations import graph_data
 from .content import Motion, State, StateTable, Version
 
@@ -170,7 +170,7 @@ def _drawings(graphs: Sequence[Graph], letters: Letters) -> list[dict[str, Json]
         return [None] * len(graphs)
     planned = [_plan(graph, letters) for graph in graphs]
     try:
-        drawn = positions([(list(sizes.values()), lines) for sizes, lines in planned])
+        drawn = positions(*[(tuple(sizes.values()), lines) for sizes, lines in planned])
     except RenderError:
         return [None] * len(graphs)
     return [_drawing(graph, sizes, where) for graph, (sizes, _), where in zip(graphs, planned, drawn, strict=True)]
@@ -179,14 +179,14 @@ def _drawings(graphs: Sequence[Graph], letters: Letters) -> list[dict[str, Json]
 _Sizes = dict[Node | str, tuple[float, float]]  # of nodes but constants, then of outputs by name
 
 
-def _plan(graph: Graph, letters: Letters) -> tuple[_Sizes, list[tuple[int, int]]]:
+def _plan(graph: Graph, letters: Letters) -> tuple[_Sizes, tuple[Line, ...]]:
     """Sizes of the parts of a drawing, and the lines between them."""
     sizes: _Sizes = {node: (_width(node, letters), NODE_HEIGHT) for node in graph.nodes if node.value is None}
     sizes |= {name: (_width(name, letters), LEAF_HEIGHT) for name in graph.outputs}
     at = {each: i for i, each in enumerate(sizes)}
     lines = [(at[edge.source], at[edge.target]) for edge in graph.edges if edge.source in at]
     lines += [(at[node], at[name]) for name, node in graph.outputs.items() if node in at]
-    return sizes, list(dict.fromkeys(lines))
+    return sizes, tuple(dict.fromkeys(lines))
 
 
 def _drawing(graph: Graph, sizes: _Sizes, where: Positions) -> dict[str, Json]:

@@ -178,19 +178,15 @@ def subject_of(model: Model) -> Subject:
     scene = of_model(model)
     system = scene.system  # a first-order one has none
     scene = moving_start(scene)
-    q, qd, qdd = np.array(scene.q), np.array(scene.qd), _in_turn(_ACCELERATIONS, system.n)
-    qd = np.where(qd == 0.0, _in_turn(_SPEEDS, system.n), qd)
+    q, qd, qdd = np.array(scene.q), np.array(scene.qd), np.resize(_ACCELERATIONS, system.n)
+    qd = np.where(qd == 0.0, np.resize(_SPEEDS, system.n), qd)
     qdd[qdd == qd] *= 2.0  # a value and its rate are two numbers
     if system.n > 1 and system.kinematics.quasi is None:
-        q = q + _in_turn(_BENDS, system.n)  # a straight arm is a special place, and so is 0
+        q = q + np.resize(_BENDS, system.n)  # a straight arm is a special place, and so is 0
         q[q == 0.0] = 0.4
     if len(system.constraints):
         q, qd = nearest_state(scene, q, qd)
     return Subject(scene, q, qd, qdd, display_names(scene))
-
-
-def _in_turn(values: Sequence[float], n: int) -> Array:
-    return np.array([values[i % len(values)] for i in range(n)])
 
 
 def lagrangian_graph(system: System) -> Graph:

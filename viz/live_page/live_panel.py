@@ -1,7 +1,5 @@
 """The panel of a live motion, for any page, and a page of it alone: nothing loaded, no script but its own."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -11,7 +11,6 @@ from cgraph import Graph, GraphError
 from cgraph._shared import Json, or_nearest
 from cgraph.extend import Names, cotangents
 from dynamics import display_names, torque_by_cause
-from dynamics.equations.torque_parts.torque_table import TorqueTable
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.multibody.quantities.torque_causes import SPURIOUS
 from dynamics.scenes import Scene
@@ -141,7 +140,7 @@ class CauseTable:
     """
 
     def __init__(self, scene: Scene, graph: Graph, formulation: str, at: Mapping[str, float]) -> None:
-        self.table: TorqueTable = torque_by_cause(scene, formulation)
+        self.table = torque_by_cause(scene, formulation)
         self.graph, self.at, self.called = graph, at, display_names(scene)
         self.names = Names(graph, self.called)
         self.units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
@@ -171,8 +170,8 @@ class CauseTable:
 
         Raises GraphError for an input that is none.
         """
-        where = {name: f"{output}_{k}" for k, name in enumerate(self.table.rows)}
-        chosen = {name: self.table.graph.outputs[where[name]] for name in rows or self.table.rows}
+        every = {name: self.table.graph.outputs[f"{output}_{k}"] for k, name in enumerate(self.table.rows)}
+        chosen = {name: every[name] for name in rows or every}
         own = Names(self.table.graph, self.called)
         what, unit = self.names.shown(output), self.units.get(output, "")
         whole = self.graph.outputs[output]

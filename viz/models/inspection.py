@@ -1,7 +1,5 @@
 """Contents of a model's page: its equations, their inputs along a motion, places of joints, shares of torques."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -11,7 +9,7 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import Array, counted, real_number
-from cgraph.extend import PRIMAL, TANGENT, topological
+from cgraph.extend import topological
 from dynamics.equations.equations_of_motion import forward_dynamics, momentum
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.formulations.verdict import formulation_verdict
@@ -31,29 +29,13 @@ from ..inspector import Motion, StateTable, Step, Version
 from ..pages.document import Table
 from ..pages.formulation_table import TITLES
 from ..paper.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
-from .node_classes import (
-    ACCELERATIONS,
-    BIAS,
-    DAMPING,
-    LEAVES,
-    POSITIONS,
-    RATES,
-    VELOCITIES,
-    form_classes,
-    formulation_classes,
-)
+from .node_classes import form_rows, formulation_classes
 
 # Those of the paper, the flawed ones first, in one picture; and equations by velocities, which may be the smallest.
 PAPER = ("by_definition", "kinetic_only", "chain_rule")
 FORMULATIONS = (*PAPER, "newton_euler")
 INVERSE, FORWARD, MOMENTUM = "inverse dynamics", "forward dynamics", "momentum"  # groups of versions
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
-# Rows of the picture by classes of both forms. Of what is solved for, the way back out is a row above the way in.
-INWARD, OUTWARD, TOP = "eliminated", "back out", "rates"
-ROWS = {
-    "of positions": (LEAVES, POSITIONS), "bias": (BIAS, DAMPING), INWARD: (ACCELERATIONS, VELOCITIES), OUTWARD: (),
-    TOP: (RATES,),
-}  # fmt: skip
 DT = 1e-3  # s, the step that the embedded formulations take
 
 
@@ -145,7 +127,7 @@ def _hamilton(scene: Scene) -> list[Version]:
     """The two forms of the equations, in momenta and in velocities. Raises as `hamilton_equations` does."""
     forms = both_forms(scene)
     hamilton, system, sizes = forms[HAMILTON], scene.system, form_sizes(forms)
-    depth = {name: counts.depth for name, counts in sizes.items()}
+    depth = {name: size["depth"] for name, size in sizes.items()}
     about = (
         "Rates of coordinates and momenta. The velocities are solved from the momenta, "
         f"{counted(depth[VELOCITIES_ALONE], 'operation')} deep; the rates of the momenta stand on them, "
@@ -157,22 +139,9 @@ def _hamilton(scene: Scene) -> list[Version]:
     )
     steps = elimination(hamilton, display_names(scene)) if is_quadratic(system) else ()
     return [
-        Version(HAMILTON, hamilton, about, steps=steps, rows=_rows(hamilton), group=MOMENTUM),
-        Version(LAGRANGE, forms[LAGRANGE], beside, rows=_rows(forms[LAGRANGE]), group=MOMENTUM),
+        Version(HAMILTON, hamilton, about, steps=steps, rows=form_rows(hamilton), group=MOMENTUM),
+        Version(LAGRANGE, forms[LAGRANGE], beside, rows=form_rows(forms[LAGRANGE]), group=MOMENTUM),
     ]
-
-
-def _rows(graph: Graph) -> dict[str, list[Node]]:
-    """{title: nodes} of `ROWS`."""
-    class_of, rows = form_classes(graph), {title: list[Node]() for title in ROWS}
-    title_of = {kind: title for title, kinds in ROWS.items() for kind in kinds}
-    if "p0_dot" in graph.outputs:
-        title_of[DAMPING] = TOP  # there it is of velocities that have been solved for
-    for node in graph.nodes:
-        title = title_of[class_of(node)]
-        back = title in (INWARD, TOP) and TANGENT in node.roles and PRIMAL not in node.roles
-        rows[OUTWARD if back else title].append(node)
-    return rows
 
 
 def _first_order(scene: Scene, end: float, times: Array | None) -> Inspection:

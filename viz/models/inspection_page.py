@@ -11,7 +11,7 @@ from dynamics.systems.model import Model, as_system
 
 from ..inspector import page
 from ..pages.html import Page, html_target
-from ..typed import box
+from ..typed.text_page import box
 from .formulas_panel import formulas_panel
 from .inspection import FORWARD, INVERSE, MOMENTUM, Inspection, inspection
 from .live_motion import live_panel

@@ -29,7 +29,7 @@ from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import SimulationWarning
 from dynamics.systems.model import Model, display_names
 
-from ..live_page import Live, page_text, panel
+from ..live_page.live_panel import Live, page_text, panel
 from ..pages.html import Page, Panel, html_target
 
 MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves

@@ -1,13 +1,11 @@
-"""Classes of the nodes of equations of motion: of a formulation, needed or not; of both forms, what they serve."""
-
-from __future__ import annotations
+"""Classes of nodes of equations of motion: of a formulation, needed or not; of both forms, what they serve, in rows."""
 
 import re
 from collections.abc import Callable, Iterable
 
 from cgraph import Graph, Node
 from cgraph._shared import descendants
-from cgraph.extend import ADJOINT, TANGENT, topological
+from cgraph.extend import ADJOINT, PRIMAL, TANGENT, topological
 from dynamics.equations.formulations.lagrange_terms import EULER, newton_euler
 from dynamics.equations.formulations.verdict import Verdict
 
@@ -22,6 +20,12 @@ _OF_ROLES = {  # by whether it is of a reverse sweep, and of a forward one
 POSITIONS = "of positions alone: kinematics, inertia, and its elimination"
 BIAS, ACCELERATIONS = "bias: of velocities, without torques", "accelerations, with the torques"
 VELOCITIES, RATES = "velocities of the momenta", "rates of the momenta"
+# Rows of the picture by classes of both forms. Of what is solved for, the way back out is a row above the way in.
+INWARD, OUTWARD, TOP = "eliminated", "back out", "rates"
+ROWS = {
+    "of positions": (LEAVES, POSITIONS), "bias": (BIAS, DAMPING), INWARD: (ACCELERATIONS, VELOCITIES), OUTWARD: (),
+    TOP: (RATES,),
+}  # fmt: skip
 
 
 def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callable[[Node], str]]:
@@ -93,3 +97,16 @@ def form_classes(graph: Graph) -> Callable[[Node], str]:
         return ACCELERATIONS if node in driven else BIAS
 
     return name
+
+
+def form_rows(graph: Graph) -> dict[str, list[Node]]:
+    """{title: nodes} of `ROWS`."""
+    class_of, rows = form_classes(graph), {title: list[Node]() for title in ROWS}
+    title_of = {kind: title for title, kinds in ROWS.items() for kind in kinds}
+    if "p0_dot" in graph.outputs:
+        title_of[DAMPING] = TOP  # there it is of velocities that have been solved for
+    for node in graph.nodes:
+        title = title_of[class_of(node)]
+        back = title in (INWARD, TOP) and TANGENT in node.roles and PRIMAL not in node.roles
+        rows[OUTWARD if back else title].append(node)
+    return rows

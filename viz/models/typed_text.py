@@ -61,12 +61,7 @@ def typed_text(model: Model, q: Sequence[float] | None = None, qd: Sequence[floa
     x(0) = 1
     """
     system = as_system(model)
-    if (
-        system.n > MOST_COORDINATES
-        or system.n != system.nq
-        or system.kinematics.quasi is not None
-        or len(system.constraints)
-    ):
+    if system.n > MOST_COORDINATES or system.kinematics.quasi is not None or len(system.constraints):
         raise ValueError(
             f"the page takes up to {MOST_COORDINATES} coordinates whose rates are velocities, without constraints; "
             f"got {system!r}"

@@ -2,17 +2,18 @@
 
 from collections.abc import Callable, Mapping
 
-from cgraph import Counts, Graph
+from cgraph import Graph
 from dynamics import Mechanism, hamilton_equations, scenes, state_equation
 
 from .. import theme
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
-from ..graph_drawing.levels import LevelPanel, Scale, levels_svg, silhouettes_svg
+from ..graph_drawing.levels import Scale, levels_svg, silhouettes_svg
 from ..pages.document import Block, Paragraph, Picture, Table
 from .both_forms import HAMILTON, LAGRANGE, SIZES, VELOCITIES_ALONE, both_forms, form_sizes, size_of
 from .mechanisms import binary_tree, chain, turned_arm
 from .part import Part, drawn
 
+Forms = Mapping[str, Mapping[str, int]]  # of both forms, or orders of elimination: their sizes, as of `form_sizes`
 TITLES = {LAGRANGE: "Lagrange: accelerations of (θ, ω)", HAMILTON: "Hamilton: rates of (θ, p)"}
 SPRING, ARM = "a rotor on a spring", "the three-link arm"
 LARGER: dict[str, Callable[[], Mechanism]] = {
@@ -44,12 +45,10 @@ def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
     shown = {SPRING: both_forms(scenes.load("spring_mass")), ARM: both_forms(scenes.load("triple_pendulum"))}
     sizes = {name: form_sizes(forms) for name, forms in shown.items()}
     sizes |= {name: form_sizes(both_forms(make())) for name, make in larger.items()}
-    spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in shown[SPRING].items()], LARGE_SCALE)
-    level = sizes[ARM][VELOCITIES_ALONE].depth
-    marks: dict[str, Mapping[str, int]] = {HAMILTON: {"ω is solved": level}}
-    arm = levels_svg(
-        [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in shown[ARM].items()], SMALL_SCALE
-    )
+    titled = {name: {TITLES[form]: graph for form, graph in forms.items()} for name, forms in shown.items()}
+    spring = levels_svg(titled[SPRING], LARGE_SCALE)
+    solved = {"ω is solved": sizes[ARM][VELOCITIES_ALONE]["depth"]}
+    arm = levels_svg(titled[ARM], SMALL_SCALE, {TITLES[HAMILTON]: solved})
     kinds = kinds_in(*shown[SPRING].values(), *shown[ARM].values())
     kinds.remove(theme.OUTPUT)  # a ring around a node here, as the captions say
     legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS), 1)
@@ -57,79 +56,71 @@ def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
     for method in ("recursive", "balanced"):
         orders |= {f"Lagrange, {method}": state_equation(long, method)}
         orders |= {f"Hamilton, {method}": hamilton_equations(long, method)}
-    each = [f"{title} {len(graph.nodes)} nodes, {graph.counts().depth} deep" for title, graph in orders.items()]
+    order_sizes = {title: size_of(graph) for title, graph in orders.items()}
+    each = [f"{title} {size['nodes']} nodes, {size['depth']} deep" for title, size in order_sizes.items()]
     towers = f"Four towers over one scale of depth: {'; '.join(each)}."
-    silhouettes = silhouettes_svg([LevelPanel(title, graph) for title, graph in orders.items()])
+    silhouettes = silhouettes_svg(orders)
+    rows = [
+        (f"{name}, {title.partition(':')[0]}", *map(str, forms[form].values()))
+        for name, forms in sizes.items()
+        for form, title in TITLES.items()
+    ]
     blocks: list[Block] = [
         Paragraph(_answer(sizes[ARM]), point=True),
         drawn("fig7a", spring, _caption("7a", SPRING, sizes[SPRING]), "auto", _seen(SPRING, sizes[SPRING])),
         Picture("", to_adaptive(legend), "The colors of Figure 7.", "auto"),
         drawn("fig7b", arm, _caption("7b", ARM, sizes[ARM]), "100%", _seen(ARM, sizes[ARM])),
         Paragraph(_cause(sizes[ARM])),
-        Table("Sizes of both forms", ("", *SIZES), _rows(sizes), file="fig7"),
-        Paragraph(_remedy(orders)),
+        Table("Sizes of both forms", ("", *SIZES), rows, file="fig7"),
+        Paragraph(_remedy(order_sizes)),
         drawn("fig7c", silhouettes, SILHOUETTES, "100%", towers),
     ]
-    data = {name: {form: size_of(counts) for form, counts in each.items()} for name, each in sizes.items()}
-    data[f"a planar chain of {LINKS}"] = {title: size_of(graph.counts()) for title, graph in orders.items()}
+    data = sizes | {f"a planar chain of {LINKS}": order_sizes}
     return Part("forms", "Figure 7: both forms by depth", blocks, {"forms": data})
 
 
-def _rows(sizes: Mapping[str, Mapping[str, Counts]]) -> list[tuple[str, ...]]:
-    return [
-        (f"{name}, {TITLES[form].partition(':')[0]}", *[str(getattr(counts, size)) for size in SIZES])
-        for name, forms in sizes.items()
-        for form, counts in forms.items()
-        if form in TITLES
-    ]
-
-
-def _caption(number: str, what: str, forms: Mapping[str, Counts]) -> str:
+def _caption(number: str, what: str, forms: Forms) -> str:
     lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
     thick = "One of the longest paths is thick; a ring is around an output, and lines from constants are left out."
     return (
         f"Figure {number}. Not in the paper: both forms of {what}, a row for each operation on the longest path to a node, the same rows for "
-        f"both: {lagrange.depth} operations deep by accelerations, {hamilton.depth} by momenta. {thick}"
+        f"both: {lagrange['depth']} operations deep by accelerations, {hamilton['depth']} by momenta. {thick}"
     )
 
 
-def _seen(what: str, forms: Mapping[str, Counts]) -> str:
+def _seen(what: str, forms: Forms) -> str:
     each = [
-        f"{TITLES[form]} {c.nodes} nodes and {c.edges} edges, {c.depth} deep and {c.width} wide"
-        for form, c in forms.items()
-        if form in TITLES
+        "{} {nodes} nodes and {edges} edges, {depth} deep and {width} wide".format(title, **forms[form])
+        for form, title in TITLES.items()
     ]
     return f"Two graphs of {what} side by side, inputs at the bottom: {'; '.join(each)}."
 
 
-def _answer(forms: Mapping[str, Counts]) -> str:
+def _answer(forms: Forms) -> str:
     lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
-    compact, parallel = (
-        "yes" if less else "no" for less in (hamilton.nodes < lagrange.nodes, hamilton.depth < lagrange.depth)
-    )
+    compact, parallel = ("yes" if hamilton[size] < lagrange[size] else "no" for size in ("nodes", "depth"))
     return (
         "Section 5 of the paper leaves the Hamiltonian graph to future work, and expects of it parallelism in place of "
         "depth, and a more compact graph. "
-        f"More compact: {compact}, {hamilton.nodes} nodes in place of {lagrange.nodes}. "
-        f"More parallel: {parallel}, {hamilton.depth} operations deep in place of {lagrange.depth}."
+        f"More compact: {compact}, {hamilton['nodes']} nodes in place of {lagrange['nodes']}. "
+        f"More parallel: {parallel}, {hamilton['depth']} operations deep in place of {lagrange['depth']}."
     )
 
 
-def _cause(forms: Mapping[str, Counts]) -> str:
-    level = forms[VELOCITIES_ALONE].depth
+def _cause(forms: Forms) -> str:
+    level = forms[VELOCITIES_ALONE]["depth"]
     return (
         "The cause can be seen. ∂L/∂θ is taken at ω, so ω has to be solved from p first, by the elimination that "
         f"otherwise gives the accelerations, {level} operations deep; the momenta of the links then go from the tip to the "
-        f"base once more, {forms[HAMILTON].depth - level} further. For accelerations the bias is computed in parallel with the factors of "
+        f"base once more, {forms[HAMILTON]['depth'] - level} further. For accelerations the bias is computed in parallel with the factors of "
         "the elimination, not after them. First or second order makes no difference: both are deep because links "
         "are eliminated one after another. A rotor alone has nothing to eliminate, and is less deep by momenta. Times "
         "and longer chains are in docs/hamiltonian.md, “The momentum graph”."
     )
 
 
-def _remedy(orders: Mapping[str, Graph]) -> str:
-    depths = {title: graph.counts().depth for title, graph in orders.items()}
-    nodes = {title: len(graph.nodes) for title, graph in orders.items()}
+def _remedy(orders: Forms) -> str:
+    nodes, depths = ({title: size[of] for title, size in orders.items()} for of in ("nodes", "depth"))
     return (
         "A balanced order of elimination makes the graph parallel: it reduces pieces of the chain to their two ends, all at the "
         "same time, and joins them in pairs. Of the depth of either form there remain one or two operations for each link, "

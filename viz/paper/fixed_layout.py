@@ -41,31 +41,24 @@ class Shape(NamedTuple):
         return (max(44.0, room + 26.0), OPERATION) if self.kind == NODE else (max(34.0, room + 18.0), LEAF)
 
 
-class Arrow(NamedTuple):
-    """One arrow.  slot: the argument's number, where the order matters, else empty."""
-
-    slot: str
-    wrong: bool
-    to_output: bool
-
-
 @dataclass(frozen=True)
 class View:
     """One graph as it is drawn: {place: shape} and {(place, place): arrow}, by places that all views share.
 
+    An arrow is the argument's number, where the order matters, else empty, and whether it is wrong.
     wrong, wrong_edges: the operations and edges that are painted so.
     """
 
     graph: Graph
     shapes: Mapping[str, Shape]
-    arrows: Mapping[tuple[str, str], Arrow]
+    arrows: Mapping[tuple[str, str], tuple[str, bool]]
     wrong: frozenset[Node]
     wrong_edges: frozenset[Edge]
 
     def drawn(self) -> dict[str, int]:
         """How many shapes and arrows of each kind the drawing has; wrong ones are among the others."""
         kinds = [shape.kind for shape in self.shapes.values()]
-        to_outputs = [arrow.to_output for arrow in self.arrows.values()]
+        to_outputs = [self.shapes[target].kind == OUTPUT for _, target in self.arrows]
         return {
             "inputs": kinds.count(INPUT),
             "operations": kinds.count(NODE),
@@ -78,7 +71,7 @@ class View:
 
     def inputs_of_mistakes(self) -> list[str]:
         """The texts of inputs all of whose arrows are wrong."""
-        sound = {source for (source, _), arrow in self.arrows.items() if not arrow.wrong}
+        sound = {source for (source, _), (_, wrong) in self.arrows.items() if not wrong}
         return [shape.texts[0] for place, shape in self.shapes.items() if shape.kind == INPUT and place not in sound]
 
 
@@ -99,11 +92,11 @@ def view_of(
     for edge in graph.edges:
         op = edge.target.op
         slot = str(edge.slot + 1) if op.arity > 1 and not op.commutative else ""
-        arrows[places[edge.source], places[edge.target]] = Arrow(slot, edge in wrong_edges, False)
+        arrows[places[edge.source], places[edge.target]] = slot, edge in wrong_edges
     for name, node in graph.outputs.items():
         place = f"output {name}"
         shapes[place] = Shape(OUTPUT, theme.OUTPUT, (names.get(name, theme.pretty(name)),), node)
-        arrows[places[node], place] = Arrow("", node in wrong, True)
+        arrows[places[node], place] = "", node in wrong
     return View(graph, shapes, arrows, wrong, wrong_edges)
 
 
@@ -135,7 +128,7 @@ def stage_svg(views: Mapping[str, View], shown: str) -> str:
     boxes: dict[tuple[str, str], list[str]] = {}
     for name, view in views.items():
         for (source, target), arrow in view.arrows.items():
-            drawn = _arrow(lines[source, target], arrow, centers[target], view.shapes[target].size[1])
+            drawn = _arrow(lines[source, target], *arrow, centers[target], view.shapes[target])
             arrows.setdefault(drawn, []).append(name)
         for place, shape in view.shapes.items():
             boxes.setdefault(_box(place, shape, centers[place]), []).append(name)
@@ -159,19 +152,20 @@ def _layout(views: Sequence[View]) -> tuple[dict[str, Size], dict[tuple[str, str
             sizes[place] = max(wide, shape.size[0]), max(high, shape.size[1])
     number = {place: i for i, place in enumerate(sizes)}
     pairs = list(dict.fromkeys([pair for view in views for pair in view.arrows]))
-    (found,) = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])
+    (found,) = positions((tuple(sizes.values()), tuple([(number[a], number[b]) for a, b in pairs])))
     lines = {(a, b): found.lines[number[a], number[b]] for a, b in pairs}
     return dict(zip(sizes, found.centers, strict=True)), lines, found.size
 
 
-def _arrow(path: str, arrow: Arrow, target: Size, height: float) -> tuple[str, str]:
-    """Class and content of an arrow to a shape that is so high."""
-    x, y = target
-    kind = " ".join(["arrow", *["wrong"] * arrow.wrong, *["to-output"] * arrow.to_output])
+def _arrow(path: str, slot: str, wrong: bool, center: Size, target: Shape) -> tuple[str, str]:
+    """Class and content of an arrow to a shape."""
+    x, y = center
+    kind = " ".join(["arrow", *["wrong"] * wrong, *["to-output"] * (target.kind == OUTPUT)])
     start = float(path[1:].split(maxsplit=1)[0])
     side = -1.0 if start < x else 1.0  # below the shape, on the side that the argument comes from
-    slot = f'<text x="{x + side * 26:.1f}" y="{y + height / 2 + 12:.1f}" font-size="{SMALL}">{arrow.slot}</text>'
-    return kind, f'><path d="{path}"/>{slot * bool(arrow.slot)}'
+    below = y + target.size[1] / 2 + 12
+    number = f'<text x="{x + side * 26:.1f}" y="{below:.1f}" font-size="{SMALL}">{slot}</text>' * bool(slot)
+    return kind, f'><path d="{path}"/>{number}'
 
 
 def _box(place: str, shape: Shape, center: Size) -> tuple[str, str]:

@@ -1,7 +1,5 @@
 """Mechanisms of any size whose graphs are counted: planar chains, arms in space, trees."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

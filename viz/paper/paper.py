@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
 
 from cgraph._shared import Json
 
@@ -32,21 +31,14 @@ QUICK: dict[Callable[..., Part], object] = {
 }
 
 
-class Paper(NamedTuple):
-    """files: {path: content}, the page last.  data: all figures as plain data."""
-
-    files: dict[Path, str | bytes]
-    data: Mapping[str, Json]
-
-
 def paper(
     folder: Path,
     say: Callable[[str], None],
     *,
     quick: bool = False,
     beside: Mapping[str, tuple[str, Callable[[], str]]] = MappingProxyType({}),
-) -> Paper:
-    """Every figure, table and the page, as they go into `folder`.
+) -> tuple[dict[Path, str | bytes], dict[str, Json]]:
+    """{path: content} of every figure, table and, last, the page, as they go into `folder`; and all figures as data.
 
     say: called with a line before and after each part.  quick: times of fewer evaluations, and shorter chains.  beside:
     {file: words of the link to it, what makes it} of pages that stand beside this one.
@@ -78,7 +70,7 @@ def paper(
     data = {name: figures for part in parts for name, figures in part.data.items()}
     files[folder / "figures.json"] = json.dumps(data, indent=1, allow_nan=False) + "\n"
     files[folder / "index.html"] = page_of(parts, {name: what for name, (what, _) in beside.items()})
-    return Paper(files, data)
+    return files, data
 
 
 def page_of(parts: Sequence[Part], links: Mapping[str, str]) -> str:

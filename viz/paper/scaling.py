@@ -1,7 +1,5 @@
 """Scaling: nodes, edges and time of each formulation as links are added."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -56,8 +56,7 @@ class Stage:
             what = f"{told} · there by mistake" if shape.paint == theme.MARKED else told
             formula = written(view.graph, shape.node, self.letters)
             name = shape.texts[0].replace(" old", "_old")
-            short = name if name == formula or not shape.named else f"{name} = {formula}"
-            text = short if shape.named else formula
+            text = f"{name} = {formula}" if shape.named and name != formula else formula
             nodes[place] = [text, what, [_number(float(each[place])) for each in values]]
         return nodes
 

@@ -40,9 +40,6 @@ def script() -> str:
     return f'"use strict";\n{operations()}{asset(html.__package__, "graph.js", "slopes.js")}{engine()}'
 
 
-TITLE = "Your own Lagrangian"
-
-
 def typed_page(text: str | None = None) -> Page:
     """The page that a Lagrangian is typed into: its equations, checked, counted, drawn and moving, offline.
 
@@ -76,7 +73,7 @@ def typed_page(text: str | None = None) -> Page:
     if text is not None and not isinstance(text, str):
         raise TypeError(f"a Lagrangian is typed as text, got {type(text).__name__}: {text!r:.60}")
     held = 'TYPED.EXAMPLES.get("double pendulum")' if text is None else _literal(text)
-    return compose(TITLE, None, (), [_panel(f"firstTyped({held})", f"{held}, true", "")])
+    return compose("Your own Lagrangian", None, (), [_panel(f"firstTyped({held})", f"{held}, true", "")])
 
 
 def box(text: str = "") -> Panel:

@@ -35,7 +35,7 @@ def test_python_is_the_graph(what, capsys):
     """With what it calls above it: the text alone runs."""
     assert cli.main(["code", "triple_pendulum", "--python", "--what", what]) == 0
     function = function_of(capsys.readouterr().out)
-    graph = EQUATIONS[what](SCENE)
+    graph = getattr(dyn, what)(SCENE)
     expected = graph.evaluate(dict(zip(graph.input_names, point(graph), strict=True)))
     assert function(point(graph)) == tuple(expected.values())
 

@@ -8,7 +8,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from tests.each_row import each_row
-from viz.graph_drawing.levels import LevelPanel, Scale, levels_of, levels_svg, longest_way, silhouettes_svg
+from viz.graph_drawing.levels import Scale, levels_of, levels_svg, longest_way, silhouettes_svg
 
 SCALE = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
 GRAPHS = {
@@ -33,8 +33,7 @@ def test_the_longest_way_has_an_operation_at_every_depth(name: str) -> None:
 
 
 def test_rows_are_depths_alike_in_all_panels_and_no_two_nodes_touch() -> None:
-    panels = [LevelPanel(name, graph) for name, graph in GRAPHS.items()]
-    places = rectangles(levels_svg(panels, SCALE))
+    places = rectangles(levels_svg(GRAPHS, SCALE))
     assert len(places) == sum(len(graph.nodes) for graph in GRAPHS.values())
     deepest = max(graph.counts().depth for graph in GRAPHS.values())
     expected = [SCALE.y(level, deepest) - 4.0 for graph in GRAPHS.values() for level in levels_of(graph).values()]
@@ -50,14 +49,14 @@ def test_rows_are_depths_alike_in_all_panels_and_no_two_nodes_touch() -> None:
 def test_texts_are_escaped_and_words_stand_at_their_row() -> None:
     x = cg.variable("x<y")
     scale = Scale(row=60.0, gap=60.0, width=40.0, height=30.0, names={"f": "f & g"})
-    svg = levels_svg([LevelPanel("a < b", cg.Graph([x], {"f": 2.5 * x}), {"here": 1})], scale)
+    svg = levels_svg({"a < b": cg.Graph([x], {"f": 2.5 * x})}, scale, {"a < b": {"here": 1}})
     for text in ("a &lt; b", "x&lt;y", "f &amp; g", "2.5", "×", "3 nodes, 2 edges, 1 deep, 2 wide"):
         assert f">{text}</text>" in svg
     assert f'y="{scale.y(1, 1) - 5:.1f}" text-anchor="start" >here</text>' in svg
 
 
 def test_a_silhouette_has_the_area_of_its_nodes_and_the_height_of_its_depth() -> None:
-    svg = silhouettes_svg([LevelPanel(name, graph) for name, graph in GRAPHS.items()], 3.0, 2.0)
+    svg = silhouettes_svg(GRAPHS, 3.0, 2.0)
     bars = re.findall(r"M([0-9.]+) ([0-9.]+)h([0-9.]+)v3.0h-([0-9.]+)z", svg)
     assert sum(float(wide) for _, _, wide, _ in bars) == 2.0 * sum(len(graph.nodes) for graph in GRAPHS.values())
     heights = {float(y) for _, y, _, _ in bars}

@@ -8,13 +8,13 @@ import pytest
 import viz.graph_drawing.render as module
 from viz.graph_drawing.render import RenderError, positions
 
-BOXES = [(50.0, 34.0), (90.0, 30.0), (58.0, 34.0), (46.0, 30.0)]
-DIAMOND = [(0, 1), (0, 2), (1, 3), (2, 3)]
+BOXES = ((50.0, 34.0), (90.0, 30.0), (58.0, 34.0), (46.0, 30.0))
+DIAMOND = ((0, 1), (0, 2), (1, 3), (2, 3))
 
 
 def test_lines_lead_up_from_shape_to_shape_and_nothing_overlaps():
-    chain = [(40.0, 20.0)] * 2, [(0, 1)]
-    first, second = positions([(BOXES, DIAMOND), chain])
+    chain = ((40.0, 20.0),) * 2, ((0, 1),)
+    first, second = positions((BOXES, DIAMOND), chain)
     assert second.lines.keys() == {(0, 1)}
     for (sizes, lines), found in zip([(BOXES, DIAMOND), chain], (first, second), strict=True):
         boxes = [
@@ -45,6 +45,6 @@ def test_without_graphviz_the_page_places_nodes_itself(monkeypatch):
     def broken(source, **options):
         raise RenderError("none")
 
-    module._positions.cache_clear()
+    module.positions.cache_clear()
     monkeypatch.setattr(module, "render_svg", broken)
     assert record(versions, None)["versions"][0]["drawing"] is None

@@ -8,7 +8,7 @@ from viz.inspector import record
 
 @pytest.fixture
 def without_graphviz(monkeypatch):
-    def none(drawings):
+    def none(*drawings):
         raise RenderError("no Graphviz")
 
     monkeypatch.setattr(record, "positions", none)

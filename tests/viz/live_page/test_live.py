@@ -21,8 +21,7 @@ from tests.registered import registered
 from tests.viz.page_elements import data_of
 from viz.lessons.screens.energy_and_step import energy_and_step
 from viz.lessons.subject import subject_of
-from viz.live_page import Live, page_text
-from viz.live_page.live_panel import SCRIPTS, functions
+from viz.live_page.live_panel import SCRIPTS, Live, functions, page_text
 from viz.models.live_motion import live_of
 from viz.pages.html import asset
 

@@ -19,7 +19,7 @@ from viz.paper import paper as module
 from viz.paper.free_fall import torque_at_rest
 from viz.paper.one_joint import STATE, WORDS, caption, moving_figure, view
 from viz.paper.scaling import SCALED, NodeScaling, edge_law
-from viz.typed import typed_page
+from viz.typed.text_page import typed_page
 
 SVG = "{http://www.w3.org/2000/svg}"
 FIGURES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig5-residual", "fig6", "fig7a", "fig7b", "fig7c", "law", "scaling")
@@ -33,8 +33,8 @@ def paper(tmp_path_factory):
     made = module.paper(folder, lines.append, quick=True, beside={"typed.html": ("Type a Lagrangian", typed_page)})
     assert not folder.exists()
     folder.mkdir()
-    write_files(made.files)
-    return folder, made.data, lines
+    write_files(made[0])
+    return folder, made[1], lines
 
 
 def test_every_figure_is_there_as_svg_and_png(paper):

@@ -1,7 +1,5 @@
 """Sweeps: a formula as a graph, its values from the inputs up, its slopes from the output down, and rates once more up."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping
