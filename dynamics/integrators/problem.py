@@ -191,7 +191,7 @@ def quantity(
         node = call_user_function(what, function, *arguments)
     else:
         q, qd, *rest = arguments
-        node = call_user_function(what, function, q, qd, list(tau), *rest, state="q, qd, tau")
+        node = call_user_function(what, function, q, qd, list(tau), *rest)
     if constant and is_finite(node):
         node = cg.constant(float(node))
     known = _known(problem)

@@ -130,10 +130,11 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
     """function(*arguments), or without the last of them, the parameters, where it does not take them.
 
     An argument with a default, as in `lambda q, qd, t, i=i: ..`, is the caller's own unless it is called t or p.
-    state: what the first of three is called.
+    state: what those before t are called, of others than q and qd.
     Raises TypeError, naming `what`, for what is no such function.
     """
-    names = "(q, qd, t) or (q, qd, t, p)" if len(arguments) == 4 else f"({state}, t) or ({state}, t, p)"
+    state = {4: "q, qd", 5: "q, qd, tau"}.get(len(arguments), state)
+    names = f"({state}, t) or ({state}, t, p)"
     if not is_function(function):
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
     for chosen, last in ((arguments, "p"), (arguments[:-1], "t")):
