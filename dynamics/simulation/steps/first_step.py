@@ -49,14 +49,16 @@ def start_registers(values: Mapping[str, Any]) -> dict[str, Any]:
 def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: int, *, starts: bool) -> Program:
     """Chosen steps, of a method of this order, with the first one and the tolerances of a run that was given none."""
     tolerance, after = _tolerance(kinds), list[Statement]()
+    lowered = () if kinds.floor is None else (each(lambda x_start: {"floor": cg.constant(0.0)}),)
+    begins = (copied("x", "x_start"), begin, *lowered)
     if starts:  # the first trial is as long as the method wishes, by sizes of the start alone
         nothing = {"search": 0.0, "longest_next": 0.0}
         wish = call(lambda first, length: {"h_next": cg.where(first, first, length), **nothing})
         sizes = If("sized", (each(lambda x_start, so_far: {"size": cg.maximum(so_far, _size(x_start))}), *tolerance))
-        found = [If("begins", (copied("x", "x_start"), begin, wish, sizes))]
+        found = [If("begins", (*begins, wish, sizes))]
     else:
-        begins = If("begins", (copied("x", "x_start"), begin, _rate(problem, "x", "t", "rate_start")))
-        found = [begins, If("look", (If("sized", _look(problem, kinds, tolerance)), searched))]
+        rate = _rate(problem, "x", "t", "rate_start")
+        found = [If("begins", (*begins, rate)), If("look", (If("sized", _look(problem, kinds, tolerance)), searched))]
         after.append(If("search", _turn(problem.size, order), seldom=True))
     later = call(lambda seen: {"seen": 2.0 * seen, "due": 0.0})
     raised = (*tolerance, *_at_rest(kinds), copied("tolerance", "atol"), later)
@@ -107,8 +109,9 @@ def _tolerance(kinds: StateKinds) -> tuple[Statement, ...]:
     known = (*grouped, Call(kinds.largest, ("size",), ("kind",)), each(by_sizes))
     if kinds.floor is None:
         return known
+    lowest = each(lambda floor, rounded: {"floor": cg.maximum(floor, rounded)})  # of the longest of looks ahead
     raised = each(lambda tolerance, floor: {"tolerance": cg.maximum(tolerance, floor)})
-    return (*known, Call(kinds.floor, ("reach",), ("floor",)), raised)
+    return (*known, lowest, raised)
 
 
 def _at_rest(kinds: StateKinds) -> list[Statement]:
@@ -152,7 +155,9 @@ def _look(problem: Problem, kinds: StateKinds, tolerance: Sequence[Statement]) -
     def shorter(fine: Node, left: Node, reach: Node) -> Values:
         return {"left": (1.0 - fine) * (left - 1.0), "reach": cg.where(fine, reach, 0.25 * reach)}
 
+    rounded = () if kinds.floor is None else (Call(kinds.floor, ("reach",), ("rounded",)),)
     euler = (
+        *rounded,
         copied("x_start", "x_ahead"),
         copied("rate_start", "rate_ahead"),
         each(lambda x_start: {"size_ahead": _size(x_start)}),
@@ -185,15 +190,20 @@ def searched(sized: Node, first: Node, reach: Node, h_first: Node, least: Node) 
 def _euler(problem: Problem, kinds: StateKinds) -> tuple[Statement, ...]:
     """One of Euler's steps; two of them, or as many as move all that moves, are `going`, as of a chain at rest."""
 
-    def doubtful(way: Node, kind: Node, change: Node, kind_before: Node, kind_ahead: Node) -> Values:
+    def doubtful(way: Node, kind: Node, change: Node, kind_before: Node, kind_ahead: Node, *rounded: Node) -> Values:
         near = cg.maximum(way <= kind, cg.equal(kind, 0.0))
-        return {"doubts": 1.0 - near * (change <= cg.maximum(kind_before, kind_ahead))}
+        doubts = 1.0 - near * (change <= cg.maximum(kind_before, kind_ahead))
+        if rounded:
+            reach, floor = rounded
+            doubts = doubts * (reach * change > floor)
+        return {"doubts": doubts}
 
     def counted(moving: Node, moving1: Node, moving2: Node, doubts: Node, turn: Node) -> Values:
         fine = cg.equal(doubts, 0.0)
         more = cg.maximum(turn < 2.0, (moving < problem.size) * (moving > moving2))
         return {"fine": fine, "going": fine * more, "moving1": moving, "moving2": moving1}
 
+    names = "way kind change kind_before kind_ahead".split() + ["reach", "rounded"] * (kinds.floor is not None)
     return (
         each(lambda x_ahead, toward, reach, rate_ahead: {"x_ahead": x_ahead + toward * reach * rate_ahead}),
         total(lambda x_ahead: {"moving": cg.not_equal(x_ahead, 0.0)}),
@@ -206,7 +216,7 @@ def _euler(problem: Problem, kinds: StateKinds) -> tuple[Statement, ...]:
         Call(kinds.largest, ("change",), ("change",)),
         each(lambda x_ahead, x_start: {"way": x_ahead - x_start}),
         Call(kinds.largest, ("way",), ("way",)),
-        total(doubtful),
+        total(doubtful, *names),
         each(lambda size_ahead, x_ahead: {"size_ahead": cg.maximum(size_ahead, _size(x_ahead))}),
         call(counted),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
@@ -99,23 +99,29 @@ def state_kinds(problem: Problem) -> StateKinds:
 
 
 def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
-    """The kinds with the floor of their errors: what rounding does to the neutral state, if it rests but for that.
+    """The kinds with the floor of their errors: what rounding does at the neutral state to what rests but for that.
 
     A body drawn upright in axes that are not the world's rests so, and steps that resolved the motion that this starts
     would be without number. Nothing is rounded along the axes of the world.
     """
     if problem.system is None or problem.momenta:
         return kinds
-    known = state_inputs(problem.model).parameters
+    known, nq = state_inputs(problem.model).parameters, problem.nq
     point = dict.fromkeys(problem.rate.input_names, 0.0)
     point |= {name: float(known[name]) for name in problem.parameters if name in known}
     point |= dict(zip(problem.states, problem.system.kinematics.neutral, strict=False))
-    pushed = _rounding(problem.rate, point)
-    at_once: Array | None = np.zeros(problem.size)
-    if pushed is not None and problem.projection is not None:
-        at_once = _rounding(problem.projection, point, rests=False)
-    if pushed is None or at_once is None or not (pushed.any() or at_once.any()):
+    rates, pushed = _rounded(problem.rate, point, error_bounds)
+    rests = np.abs(rates) <= MOVES * pushed
+    if not (np.isfinite(pushed).all() and rests[nq:].any()):  # that much tell wider bounds, which cost less
         return kinds
+    pushed = _rounded(problem.rate, point, output_bounds)[1]
+    pushed[(np.abs(rates) > MOVES * pushed) | (np.arange(problem.size) < nq)] = 0.0
+    at_once = np.zeros(problem.size)
+    if problem.projection is not None:
+        at_once = np.nan_to_num(_rounded(problem.projection, point, output_bounds)[1], posinf=0.0)
+    if not (pushed.any() or at_once.any()):
+        return kinds
+    pushed, at_once = (values_of(kinds.largest, each) for each in (pushed, at_once))  # one passes it on to another
     turned = np.zeros(problem.size)  # coordinates by the velocities that move them
     for k, those in enumerate(kinds.moved):
         for j in those:
@@ -125,19 +131,16 @@ def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
     return replace(kinds, floor=cg.simplify(numbered_graph([time], [a + time * (b + time * c) for a, b, c in rows])))
 
 
-def _rounding(graph: Graph, point: Mapping[str, float], *, rests: bool = True) -> Array | None:
-    """Bounds of the rounding errors of the outputs at a point; None where some are not finite.
-
-    rests: or where outputs are more than their errors; the wider bounds, which cost less, tell most of these.
-    """
+def _rounded(graph: Graph, point: Mapping[str, float], bounds: Callable[..., Any]) -> tuple[Array, Array]:
+    """The outputs at a point, and bounds of their rounding errors, by `error_bounds` or `output_bounds`."""
     outputs, roundoff = list(graph.outputs.values()), 2.0**-53
     nodes, inputs = topological(outputs), {name: np.array([point[name]]) for name in graph.input_names}
-    found, errors = error_bounds(nodes, inputs, roundoff)
-    values, wide = (np.array([np.ravel(each[node])[0] for node in outputs]) for each in (found, errors))
-    if not np.isfinite(wide).all() or (rests and (np.abs(values) > MOVES * wide).any()):
-        return None
-    bounds: Array = output_bounds(nodes, outputs, inputs, roundoff, 0.0, float)[1][:, 0]
-    return None if rests and (np.abs(values) > MOVES * bounds).any() else bounds
+    if bounds is output_bounds:
+        found, errors = output_bounds(nodes, outputs, inputs, roundoff, 0.0, float)
+        return np.array([np.ravel(found[node])[0] for node in outputs]), errors[:, 0]
+    found, wide = error_bounds(nodes, inputs, roundoff)
+    values, errors = (np.array([np.ravel(each[node])[0] for node in outputs]) for each in (found, wide))
+    return values, errors
 
 
 def off_by(errors: Array, scale: Array, allowed: Array, components: tuple[str, ...]) -> str:
