@@ -25,7 +25,6 @@ from .mjcf_contacts import has_balls, mjcf_balls
 from .mujoco_module import mujoco, word_of
 from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import (
-    NONE,
     Smooth,
     actuators,
     disabled,
@@ -53,7 +52,7 @@ _OF_AN_ACTUATOR = ("actuator_armature", "actuator_damping", "actuator_dampingpol
 _NOT_LINEAR = ("jnt_stiffnesspoly", "jnt_springyield", "dof_dampingpoly")
 
 
-def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
+def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth) -> Mechanism:
     """The mechanism of MuJoCo's model. Raises MechanismError for what a mechanism cannot have."""
     names, labels = _body_names(mj), [mj.joint(j).name for j in range(mj.njnt)]
     left_out = refused_or_left_out(_not_modelled(mj), _acting_from_outside(mj, smooth), ignore)

@@ -5,6 +5,7 @@ These have joints locked and freed, and subtrees taken off and hung on.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph import Graph
 from cgraph._shared import HoldsNodes, kept_by_first
 
 from ..bodies.body import (
@@ -84,7 +86,7 @@ class Subtree:
 
 
 @dataclass(frozen=True, eq=False)
-class Structure(HoldsNodes):
+class Structure(HoldsNodes, ABC):
     """The fields of a `Mechanism`, see there, and copies with joints locked or freed, or with other subtrees."""
 
     bodies: Sequence[Body]
@@ -96,6 +98,15 @@ class Structure(HoldsNodes):
     left_out: tuple[str, ...] = ()
     loops: Sequence[Loop] = ()
     starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    @abstractmethod
+    def moving(self) -> tuple[Body, ...]:
+        """The bodies that move, parents first."""
+
+    @abstractmethod
+    def position(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
+        """Position of a point of a body: outputs x, y, z."""
 
     @property
     def parameter_values(self) -> dict[str, float]:
