@@ -136,11 +136,6 @@ def to_z(axis: Array) -> Array:
     return snapped(np.column_stack([x, np.cross(axis, x), axis]))
 
 
-def joint_placement(outer: Array, orientation: ArrayLike, position: ArrayLike, axes: Array) -> tuple[Array, Triple]:
-    """Placement of a joint at q = 0: its `axes` as columns and its origin, both in the parent's axes `outer`."""
-    return snapped(outer.T @ np.asarray(orientation) @ axes), constant(product(outer.T, np.asarray(position)))
-
-
 def parallel_axis(inertia: Array, mass: float | Node, offset: Array) -> Array:
     """Inertia about a point `offset` away from the center of mass (parallel axes)."""
     x, y, z = offset
@@ -183,8 +178,7 @@ def constant(vector: Array) -> Triple:
 
 def rotate_transpose(matrix: Matrix, vector: Triple) -> Triple:
     """matrix^T vector: what a parent's vector is in a child's axes, the columns of `matrix`."""
-    x, y, z = (total([matrix[i][j] * vector[i] for i in range(3)]) for j in range(3))
-    return x, y, z
+    return rotate([*zip(*matrix, strict=True)], vector)
 
 
 def rotate(matrix: Matrix, vector: Triple) -> Triple:

@@ -20,16 +20,16 @@ from ..algebra.spatial import ZERO
 from ..bodies.body import Body, MechanismError, quantity, unknown_body
 from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
-from ..parameters import Quantity, names_in, symbol
+from ..parameters import Quantity, symbol
 from ..sweeps.kinematic_chain import KinematicChain
 from .contact import Contact, check_contact, touch
-from .external_force import FORCE, Force, check_force, powers
+from .external_force import FORCE, Force, HasParameters, check_force, powers
 
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class JointForce(ABC):
+class JointForce(HasParameters, ABC):
     """A force along the freedoms of a joint, smooth or with kinks, one of the `forces` of a mechanism.
 
     On a joint that is locked it has no effect. `JointSpring`, `JointLimit`, `JointFriction` and `Actuator` are such;
@@ -63,21 +63,6 @@ class JointForce(ABC):
     def shares(self) -> Mapping[str, float]:
         """{body: how far its joint moves the coordinate of the force}."""
         return {self.body: 1.0} if isinstance(self.body, str) else self.body
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        """Names of the parameters that it uses, and that are 0 without a value; of one of your own what it reads."""
-        return ()
-
-    @property
-    def quantities(self) -> Mapping[str, Callable[[str, object], object]]:
-        """Fields that may be parameters, and the checks of their values."""
-        return {}
-
-    @property
-    def names(self) -> set[str]:
-        """Set of the names of its parameters."""
-        return {*self.components, *names_in([getattr(self, name) for name in self.quantities])}
 
     @property
     def label(self) -> str:

@@ -28,7 +28,7 @@ from ..bodies.body import (
     quantities,
 )
 from ..bodies.composed_joints import parts_of
-from ..forces.contact import CONTACT_QUANTITIES, Contact
+from ..forces.contact import Contact
 from ..forces.joint_force import AnyForce, JointForce
 from ..loops import Loop, coupled
 from ..parameters import Quantities, bound, entries, evaluated, names_in
@@ -285,7 +285,7 @@ def uses(bodies: Sequence[Body], gravity: Quantities, forces: Iterable[AnyForce]
     if names := names_in(entries(gravity)):
         yield Use("gravity", gravity, names, quantities)
     for force in [each for each in forces if isinstance(each, Contact | JointForce)]:
-        yield from _uses_in(force.label, force, _quantities(force))
+        yield from _uses_in(force.label, force, force.quantities)
     for body in bodies:
         yield from _uses_of(body)
 
@@ -336,11 +336,6 @@ def require_values(
                 raise MechanismError(f"{error}, where {listed}{of}") from None
 
 
-def _quantities(force: Contact | JointForce) -> Mapping[str, Callable[[str, object], object]]:
-    """The checks of fields that may be parameters."""
-    return CONTACT_QUANTITIES if isinstance(force, Contact) else force.quantities
-
-
 def bound_body(body: Body, values: Mapping[str, float]) -> Body:
     """The body with numbers in place of these parameters; itself where it has none of them."""
     if not any([use.names.keys() & values.keys() for use in _uses_of(body)]):
@@ -355,7 +350,7 @@ def bound_force(force: AnyForce, values: Mapping[str, float]) -> AnyForce:
     if not force.names & values.keys():
         return force
     if isinstance(force, Contact | JointForce):
-        numbers = {name: bound(getattr(force, name), values) for name in _quantities(force)}
+        numbers = {name: bound(getattr(force, name), values) for name in force.quantities}
         return replace(force, **numbers) if numbers else force
     value, torque = ([bound(each, values) for each in three] for three in (force.value, force.torque))
     return replace(force, value=value, torque=torque)
