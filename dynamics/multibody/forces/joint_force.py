@@ -351,7 +351,12 @@ def generalized_forces(
     for force in forces:
         if isinstance(force, Force | Contact):
             with building(build), cg.tag(force.body, FORCE):
-                shares = cotangents(gathered(_powers(force, chain, parameters)), qd, build)
+                if isinstance(force, Force):
+                    pairs = powers(force, chain(force.body), parameters)
+                else:
+                    at_touch = touch(force, chain(force.body), chain(force.to))
+                    pairs = [*zip(at_touch.velocity, at_touch.force, strict=True)]
+                shares = cotangents(gathered(pairs), qd, build)
                 total = [sum_ + share for sum_, share in zip(total, shares, strict=True)]
     where = {body.name: place for body, place in zip(moving, places(moving), strict=True)}
     for force in [each for each in forces if isinstance(each, JointForce)]:
@@ -367,13 +372,3 @@ def generalized_forces(
                 for k, node in zip(range(at.u.start, at.u.stop), along, strict=True):
                     total[k] = total[k] + share * node
     return total
-
-
-def _powers(
-    force: Force | Contact, chain: Callable[[str], KinematicChain], parameters: Mapping[str, Node]
-) -> list[tuple[Node, Node]]:
-    """Velocities, and the forces on them."""
-    if isinstance(force, Force):
-        return powers(force, chain(force.body), parameters)
-    state = touch(force, chain(force.body), chain(force.to))
-    return list(zip(state.velocity, state.force, strict=True))
