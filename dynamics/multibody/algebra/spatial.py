@@ -9,14 +9,14 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
 from cgraph import Node
 from cgraph._shared import Array
 from cgraph.extend import as_node
 
+from ...systems.kinematics import ZERO as ZERO, dot as dot  # noqa: PLC0414 (of triples, too)
+
 Triple = tuple[Node, Node, Node]
 Matrix = Sequence[Sequence[float | Node]]  # (3, 3)
-ZERO = cg.constant(0.0)
 STILL: Triple = (ZERO, ZERO, ZERO)
 SNAP = 1e-14  # of length 1: a component of a rotation that is no more comes from a quarter turn, or one in text
 SUM_ROUNDING = 2.0**-48  # of the terms of a sum: what is left is their rounding if it is no more
@@ -147,11 +147,6 @@ def parallel_axis(inertia: Array, mass: float | Node, offset: Array) -> Array:
 def total(terms: Sequence[Node]) -> Node:
     """The sum of nodes, 0 for none."""
     return sum(terms, ZERO)
-
-
-def dot(a: Triple, b: Triple) -> Node:
-    """Scalar product."""
-    return total([x * y for x, y in zip(a, b, strict=True)])
 
 
 def cross(a: Triple, b: Triple) -> Triple:
