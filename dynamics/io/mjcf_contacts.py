@@ -23,11 +23,6 @@ TAKEN = (("plane", "sphere"), ("plane", "capsule"), ("sphere", "sphere"))  # kin
 SLIDING = 3  # dimensions of a contact with friction that slides and does no more
 
 
-def has_balls(mj: MjModel) -> bool:
-    """Whether spheres or capsules are among the shapes."""
-    return any([word_of("Geom", kind) in ("sphere", "capsule") for kind in mj.geom_type])
-
-
 def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Contact], list[str]]:
     """Spheres that meet planes and spheres, ends of capsules on planes, and sentences on other contacts.
 

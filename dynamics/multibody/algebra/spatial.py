@@ -144,11 +144,6 @@ def parallel_axis(inertia: Array, mass: float | Node, offset: Array) -> Array:
                                            [-x * z, -y * z, x * x + y * y]]))  # fmt: skip
 
 
-def total(terms: Sequence[Node]) -> Node:
-    """The sum of nodes, 0 for none."""
-    return sum(terms, ZERO)
-
-
 def cross(a: Triple, b: Triple) -> Triple:
     """Vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -178,7 +173,7 @@ def rotate_transpose(matrix: Matrix, vector: Triple) -> Triple:
 
 def rotate(matrix: Matrix, vector: Triple) -> Triple:
     """matrix vector: what a child's vector is in its parent's axes."""
-    x, y, z = (total([row[i] * vector[i] for i in range(3)]) for row in matrix)
+    x, y, z = (sum([row[i] * vector[i] for i in range(3)], ZERO) for row in matrix)
     return x, y, z
 
 
