@@ -5,6 +5,8 @@ from importlib import import_module
 
 from sphinx.util.docutils import SphinxDirective
 
+WITH_INHERITED = ("Compiled", "Contact", "Force", "JointForce", "Mechanism")  # of bases without a page
+
 
 class Names(SphinxDirective):
     """```{names} dynamics``` and below it, in any number of lines, names of that package or module."""
@@ -27,7 +29,7 @@ def _directive(package, name):
         members = ["   :members:", "   :imported-members:", f"   :exclude-members: {elsewhere}"]
         return [f".. automodule:: {package}.{name}", *members, ""]
     if inspect.isclass(value):
-        inherited = ["   :inherited-members:"] if name in ("Compiled", "Mechanism") else []  # bases without a page
+        inherited = ["   :inherited-members:"] if name in WITH_INHERITED else []
         return [f".. autoclass:: {package}.{name}", "   :members:", *inherited, ""]
     if callable(value):
         return [f".. autofunction:: {package}.{name}", ""]

@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cgraph._shared import Array, real_number, require_choice, require_mapping
 
-from ..multibody.algebra import spatial
 from ..multibody.forces.contact import CONTACT_QUANTITIES, Contact
 from ..multibody.trees.mechanism import WORLD, Mechanism, MechanismError
 from .left_out import present
@@ -19,19 +17,6 @@ Material: TypeAlias = str | Mapping[str, float | str]  # "compliant", or quantit
 SINK = 0.01  # of r: how far a sphere sinks that carries the weight of the whole model; of two, 1/r = 1/r_1 + 1/r_2
 CREEP = 0.1  # of sqrt(g sink): the transition velocity of friction
 FRICTION = 1.0  # where the file says nothing, as in MuJoCo
-
-
-class Ball(NamedTuple):
-    """A sphere of a body on a plane, or a sphere, of the world or of another body."""
-
-    body: str
-    at: Array  # (3,), in the body's frame [m]
-    radius: float  # m
-    friction: float = FRICTION
-    to: str = WORLD
-    to_at: ArrayLike = (0.0, 0.0, 0.0)  # a point of the plane, or the center of the sphere [m]
-    to_radius: float | None = None  # m; None: a plane
-    normal: ArrayLike | None = None  # of the plane; None: against gravity
 
 
 def untaken(takeable: bool) -> str:
@@ -64,9 +49,9 @@ def capsule_ends(center: Array, axis: Array, half: float) -> list[Array]:
 
 
 def with_contacts(
-    mechanism: Mechanism, material: Mapping[str, float | str], balls: Sequence[Ball], left_out: Sequence[str]
+    mechanism: Mechanism, material: Mapping[str, float | str], balls: Sequence[Contact], left_out: Sequence[str]
 ) -> Mechanism:
-    """The mechanism with contacts of the balls, of those that move.
+    """The mechanism with the contacts of balls, those that move, to which its weight gives their material.
 
     material: see `asked`; a name is a parameter of the number that all contacts have.  left_out: sentences on contacts
     that are not among them.
@@ -77,12 +62,11 @@ def with_contacts(
     mechanism = replace(mechanism, left_out=(*mechanism.left_out, *said))
     if not balls:
         return mechanism
-    pull = np.asarray(mechanism.gravity, dtype=np.float64)
-    gravity = float(np.linalg.norm(pull))
+    gravity = float(np.linalg.norm(np.asarray(mechanism.gravity, dtype=np.float64)))
     weight = gravity * sum([float(body.mass) for body in mechanism.moving])
     if not weight:
         raise MechanismError("the stiffness of contacts follows from the weight of the model, and it has none")
-    contacts = [_contact(ball, weight, pull, gravity) for ball in balls]
+    contacts = [_of_material(ball, weight, gravity) for ball in balls]
     parameters = dict(mechanism.parameters)
     for what, name in material.items():
         if isinstance(name, str):
@@ -109,20 +93,7 @@ def standing(mechanism: Mechanism, q: Sequence[float], floating: bool) -> list[f
     return found
 
 
-def _contact(ball: Ball, weight: float, pull: Array, gravity: float) -> Contact:
-    size = ball.radius if ball.to_radius is None else 1.0 / (1.0 / ball.radius + 1.0 / ball.to_radius)
-    sink = SINK * size
+def _of_material(ball: Contact, weight: float, gravity: float) -> Contact:
+    sink = SINK * (ball.radius if ball.to_radius is None else 1.0 / (1.0 / ball.radius + 1.0 / ball.to_radius))
     falling = float(np.sqrt(gravity * sink))  # m/s
-    return Contact(
-        ball.body,
-        ball.to,
-        at=ball.at,
-        to_at=ball.to_at,
-        to_radius=ball.to_radius,
-        normal=spatial.snapped(-pull / gravity) if ball.normal is None else ball.normal,
-        radius=ball.radius,
-        stiffness=weight / sink**1.5,
-        dissipation=1.0 / falling,
-        friction=ball.friction,
-        velocity=CREEP * falling,
-    )
+    return replace(ball, stiffness=weight / sink**1.5, dissipation=1.0 / falling, velocity=CREEP * falling)

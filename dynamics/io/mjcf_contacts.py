@@ -10,7 +10,8 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..multibody.algebra import spatial
-from .contacts import Ball, capsule_ends
+from ..multibody.forces.contact import Contact
+from .contacts import capsule_ends
 from .left_out import listed, present
 from .mujoco_module import mujoco, word_of
 from .smooth_forces import disabled
@@ -22,12 +23,7 @@ TAKEN = (("plane", "sphere"), ("plane", "capsule"), ("sphere", "sphere"))  # kin
 SLIDING = 3  # dimensions of a contact with friction that slides and does no more
 
 
-def has_balls(mj: MjModel) -> bool:
-    """Whether spheres or capsules are among the shapes."""
-    return any([word_of("Geom", kind) in ("sphere", "capsule") for kind in mj.geom_type])
-
-
-def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Ball], list[str]]:
+def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Contact], list[str]]:
     """Spheres that meet planes and spheres, ends of capsules on planes, and sentences on other contacts.
 
     ends: of each of MuJoCo's bodies, the name of ours, and the origin of its frame in that one's.
@@ -36,7 +32,7 @@ def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Bal
         return [], []
     words, data = [word_of("Geom", kind) for kind in mj.geom_type], mujoco().MjData(mj)
     mujoco().mj_kinematics(mj, data)  # planes stand still
-    balls: list[Ball] = []
+    balls: list[Contact] = []
     others: list[str] = []
     rolling, weld = False, mj.body_weldid[mj.geom_bodyid]
     for (first, second), (friction, dimensions) in _meetings(mj).items():
@@ -49,7 +45,7 @@ def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Bal
         rolling |= dimensions > SLIDING
         (body, origin), (to, to_origin) = (ends[int(mj.geom_bodyid[each])] for each in (geom, ground))
         center, radius = origin + mj.geom_pos[geom], float(mj.geom_size[geom, 0])
-        against: dict[str, Any] = {"friction": friction if dimensions >= SLIDING else 0.0}
+        against: dict[str, Any] = {"stiffness": 0.0, "friction": friction if dimensions >= SLIDING else 0.0}
         if kinds[0] == "plane":
             normal = spatial.snapped(data.geom_xmat[ground].reshape(3, 3)[:, 2])
             against |= {"to_at": data.geom_xpos[ground].copy(), "normal": normal}
@@ -58,7 +54,7 @@ def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Bal
             against |= {"to_radius": float(mj.geom_size[ground, 0])}
         axis = spatial.from_quaternion(mj.geom_quat[geom])[:, 2]
         centers = capsule_ends(center, axis, float(mj.geom_size[geom, 1])) if kinds[1] == "capsule" else [center]
-        balls += [Ball(body, spatial.cleaned(at), radius, **against) for at in centers]
+        balls += [Contact(body, at=spatial.cleaned(at), radius=radius, **against) for at in centers]
     sentences = {
         f"contacts other than of spheres, and of capsules with planes ({listed(others)})": others,
         "torsional and rolling friction of contacts": rolling,

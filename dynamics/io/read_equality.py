@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -22,14 +22,7 @@ if TYPE_CHECKING:
     from mujoco import MjModel
 
 _MODELLED = ("joint", "connect", "weld", "tendon")
-
-
-class End(NamedTuple):
-    """Placement of a frame of MuJoCo's in that of one of our bodies."""
-
-    body: str
-    position: Array  # (3,) [m]
-    orientation: Array  # (3, 3)
+End = tuple[str, Array, Array]  # one of our bodies, and position [m] and axes in it of a frame of MuJoCo's
 
 
 def read_loops(mj: MjModel, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> list[Loop]:
@@ -95,16 +88,14 @@ def _loop(mj: MjModel, i: int, moving: Sequence[Body], ends: Sequence[tuple[str,
     kind, name = _kind(mj, i), mj.equality(i).name
     if kind in ("joint", "tendon"):
         return _coupling(mj, i, name, moving)
-    body, to = _sites(mj, i, ends) or _frames(mj, i, ends)
-    if body.body == to.body:
-        raise MechanismError(f"equality constraint {name or f'number {i}'} holds the body {body.body!r} to itself")
-    if body.body == WORLD:
-        body, to = to, body
-    at, to_at = body.position.tolist(), to.position.tolist()
+    held = _sites(mj, i, ends) or _frames(mj, i, ends)
+    (body, at, turn), (to, to_at, to_turn) = held[::-1] if held[0][0] == WORLD else held
+    if body == to:
+        raise MechanismError(f"equality constraint {name or f'number {i}'} holds the body {body!r} to itself")
     if kind == "connect" or not mj.eq_data[i, 10]:  # of a weld its torquescale
-        return Loop("point", body.body, to.body, at, to_at, name=name)
-    orientation = spatial.snapped(to.orientation @ body.orientation.T)
-    return Loop("weld", body.body, to.body, at, to_at, orientation=orientation, name=name)
+        return Loop("point", body, to, at.tolist(), to_at.tolist(), name=name)
+    orientation = spatial.snapped(to_turn @ turn.T)
+    return Loop("weld", body, to, at.tolist(), to_at.tolist(), orientation=orientation, name=name)
 
 
 def _coupling(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Loop:
@@ -135,7 +126,7 @@ def _sites(mj: MjModel, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End,
     sites = []
     for site in (int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])):
         body, origin = ends[mj.site_bodyid[site]]
-        sites.append(End(body, origin + mj.site_pos[site], spatial.from_quaternion(mj.site_quat[site])))
+        sites.append((body, origin + mj.site_pos[site], spatial.from_quaternion(mj.site_quat[site])))
     return sites[0], sites[1]
 
 
@@ -145,5 +136,5 @@ def _frames(mj: MjModel, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End
     data, turn = np.array(mj.eq_data[i]), np.eye(3)
     point, computed = data[0:3], spatial.cleaned(data[3:6])
     if _kind(mj, i) == "connect":
-        return End(body, origin + point, turn), End(to, to_origin + computed, turn)
-    return End(body, origin + computed, spatial.from_quaternion(data[6:10])), End(to, to_origin + point, turn)
+        return (body, origin + point, turn), (to, to_origin + computed, turn)
+    return (body, origin + computed, spatial.from_quaternion(data[6:10])), (to, to_origin + point, turn)

@@ -21,11 +21,10 @@ from ..multibody.joints import TYPES
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
 from .contacts import untaken, with_contacts
 from .left_out import listed, present, refused_or_left_out
-from .mjcf_contacts import has_balls, mjcf_balls
+from .mjcf_contacts import mjcf_balls
 from .mujoco_module import mujoco, word_of
 from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import (
-    NONE,
     Smooth,
     actuators,
     disabled,
@@ -53,7 +52,7 @@ _OF_AN_ACTUATOR = ("actuator_armature", "actuator_damping", "actuator_dampingpol
 _NOT_LINEAR = ("jnt_stiffnesspoly", "jnt_springyield", "dof_dampingpoly")
 
 
-def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
+def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth) -> Mechanism:
     """The mechanism of MuJoCo's model. Raises MechanismError for what a mechanism cannot have."""
     names, labels = _body_names(mj), [mj.joint(j).name for j in range(mj.njnt)]
     left_out = refused_or_left_out(_not_modelled(mj), _acting_from_outside(mj, smooth), ignore)
@@ -214,6 +213,7 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     """Sentences on inputs and forces on the mechanism that are not smooth, and not taken."""
     limited = not disabled(mj, "CONSTRAINT", "LIMIT")
     limits = [j for j in sorted(_where(mj, "jnt_limited")) if smooth.limits is None or not single(mj, j)]
+    takeable = any([word_of("Geom", kind) in ("sphere", "capsule") for kind in mj.geom_type])
     touching = (np.any(mj.geom_contype) and np.any(mj.geom_conaffinity)) or mj.npair
     pulling = {
         what: [t for t in sorted(_where(mj, f"tendon_{field}")) if taken is None or not fixed_tendon(mj, t)]
@@ -231,7 +231,7 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     acting = {} if disabled(mj, "ACTUATION") else {i: _at_rest(mj, i) for i in left}
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
     others = {
-        untaken(has_balls(mj)): touching and smooth.contacts is None and not disabled(mj, "CONSTRAINT", "CONTACT"),
+        untaken(takeable): touching and smooth.contacts is None and not disabled(mj, "CONSTRAINT", "CONTACT"),
         f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
         f"tendon limits ({_tendons(mj, pulling['limits'])})": pulling["limits"] and limited,
         f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,

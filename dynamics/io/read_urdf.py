@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
-from typing import Any, NamedTuple
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -14,14 +14,15 @@ from cgraph._shared import Array, require_flag
 from ..multibody.algebra import spatial
 from ..multibody.bodies.body import moment_rounding
 from ..multibody.bodies.limits import ANYTHING, NO_LIMITS, Limits
+from ..multibody.forces.contact import Contact
 from ..multibody.forces.joint_force import JointForce, JointFriction, JointLimit
 from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
-from .contacts import Ball, capsule_ends, untaken, with_contacts
+from .contacts import FRICTION, capsule_ends, untaken, with_contacts
 from .left_out import follows_itself, listed, present, refused_or_left_out
 from .recorded_element import XACRO, Recorded, unread
-from .smooth_forces import NONE, Smooth
+from .smooth_forces import Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
 FAR_LIMIT = 1e9  # in any unit: a limit that is there because URDF asks for one; it stands for none
@@ -31,19 +32,7 @@ _SINGLE = ("continuous", "revolute", "prismatic")  # joints with one coordinate
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
-class _Inertial(NamedTuple):
-    """Fields of a body: mass, center and inertia in the link's frame, without negative principal moments.
-
-    least: the least principal moment in the file, where it is negative [kg m^2], else 0.
-    digits: the most by which moments differ from those that the file's numbers are rounded from [kg m^2].
-    """
-
-    fields: dict[str, Any]
-    least: float = 0.0
-    digits: float = 0.0
-
-
-def read_urdf(robot: Recorded, called: str, ignore: bool, floating: bool = False, smooth: Smooth = NONE) -> Mechanism:
+def read_urdf(robot: Recorded, called: str, ignore: bool, floating: bool, smooth: Smooth) -> Mechanism:
     """The mechanism of a robot, whose root link stands still or floats. Raises MechanismError with one sentence."""
     try:
         if require_flag("floating", floating):
@@ -61,14 +50,14 @@ def read_urdf(robot: Recorded, called: str, ignore: bool, floating: bool = False
         rotors = _armatures(robot, joints, limits)
         with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
             inertials = {name: _inertial(link, name) for name, link in links.items()}
-            bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **inertials[root].fields)]
+            bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **inertials[root][0])]
             for name, element in joints.items():
                 parent, child = _end(element, name, "parent"), _end(element, name, "child")
                 own = {"limits": limits[name], "armature": rotors.get(name, 0.0)}
-                bodies.append(Body(child, _joint(element, name, child, own), parent, **inertials[child].fields))
+                bodies.append(Body(child, _joint(element, name, child, own), parent, **inertials[child][0]))
         losses = {name: loss for name, joint in joints.items() if (loss := _friction(joint, name))}
         loops, gravity = _couplings(joints, leaders), _gravity(robot)
-        balls = ([], []) if smooth.contacts is None else _balls(links)
+        balls = ([], []) if smooth.contacts is None else _balls(links, gravity)
         forces, left = _forces(joints, limits, losses, smooth)
         takeable = any([[*robot.iterfind(f"link/collision/geometry/{shape}")] for shape in BALLS])
         what = {
@@ -214,12 +203,16 @@ def _armatures(robot: Element, joints: Mapping[str, Element], limits: Mapping[st
     return found
 
 
-def _inertial(link: Element, name: str) -> _Inertial:
-    """Inertial of a link; empty for a link without."""
+def _inertial(link: Element, name: str) -> tuple[dict[str, Any], float, bool]:
+    """Fields of a body: mass, center and inertia in the link's frame, without negative principal moments, if any.
+
+    Then the least principal moment in the file [kg m^2], 0 if none is negative, and whether rounding to the file's
+    digits makes it of 0.
+    """
     where = f"link {name!r}"
     inertial = _one(link, where, "inertial")
     if inertial is None:
-        return _Inertial({})
+        return {}, 0.0, False
     mass, moments = (_one(inertial, where, tag) for tag in ("mass", "inertia"))
     if mass is None or moments is None:
         raise MechanismError(f"{where} has an <inertial> without <{'mass' if mass is None else 'inertia'}>")
@@ -228,20 +221,20 @@ def _inertial(link: Element, name: str) -> _Inertial:
     inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
     fields = {"mass": _numbers(mass, where, "value", 1)[0], "center": center, "inertia": inertia}
     if not np.isfinite(inertia).all():
-        return _Inertial(fields)
+        return fields, 0.0, False
     values, axes = np.linalg.eigh(inertia)
     if values[0] >= -moment_rounding(float(np.abs(values).max()), fields["mass"] * float(center @ center)):
-        return _Inertial(fields)
+        return fields, 0.0, False
     fields["inertia"] = axes @ np.diag(np.maximum(values, 0.0)) @ axes.T
     texts = [moments.get(entry, "") for entry in (*_ENTRIES, "ixy", "ixz", "iyz")]
     places = [Decimal(text.strip()).as_tuple().exponent for text in texts if float(text)]  # a 0 is taken as exact
-    return _Inertial(fields, float(values[0]), 0.5 * math.hypot(*[10.0 ** int(place) for place in places]))
+    return fields, float(values[0]), bool(-values[0] <= 0.5 * math.hypot(*[10.0 ** int(place) for place in places]))
 
 
-def _negative(inertials: Mapping[str, _Inertial], *, by_digits: bool) -> list[str]:
+def _negative(inertials: Mapping[str, tuple[object, float, bool]], *, by_digits: bool) -> list[str]:
     """A sentence on links with negative moments: those that rounding to the file's digits makes of 0, or the others."""
-    least = {name: each for name, each in inertials.items() if each.least < 0.0}
-    chosen = [f"{name}: {each.least:.3g}" for name, each in least.items() if (-each.least <= each.digits) == by_digits]
+    least = [(name, value) for name, (_, value, rounded) in inertials.items() if value < 0.0 and rounded == by_digits]
+    chosen = [f"{name}: {value:.3g}" for name, value in least]
     return present({f"moments of inertia below 0 ({listed(chosen)} kg m^2)": chosen})
 
 
@@ -322,11 +315,13 @@ def _forces(
     }
 
 
-def _balls(links: Mapping[str, Element]) -> tuple[list[Ball], list[str]]:
+def _balls(links: Mapping[str, Element], gravity: Sequence[float]) -> tuple[list[Contact], list[str]]:
     """Spheres and ends of capsules of the links, and sentences on contacts other than theirs with the ground."""
-    balls: list[Ball] = []
+    balls: list[Contact] = []
     others: list[str] = []
     touching: dict[str, None] = {}
+    ground: dict[str, Any] = {"friction": FRICTION, "stiffness": 0.0}
+    ground["normal"] = spatial.snapped(-np.array(gravity) / (np.linalg.norm(gravity) or 1.0))
     for name, link in links.items():
         for collision in link.findall("collision") if name != WORLD else ():
             touching[name] = None
@@ -343,7 +338,7 @@ def _balls(links: Mapping[str, Element]) -> tuple[list[Ball], list[str]]:
             if not (radius > 0.0 and half >= 0.0):
                 raise MechanismError(f"{where}: radius must be positive, and length not negative")
             centers = capsule_ends(center, turn[:, 2], half) if half else [center]
-            balls += [Ball(name, at, radius) for at in centers]
+            balls += [Contact(name, at=at, radius=radius, **ground) for at in centers]
     sentences = {
         f"contacts of shapes other than spheres and capsules ({listed(others)})": others,
         "contacts of links with one another": len(touching) > 1,

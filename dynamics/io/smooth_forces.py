@@ -36,13 +36,12 @@ class Smooth:
     contacts: what these have in place of numbers that follow from the file; None leaves contacts out.
     """
 
-    limits: tuple[float, float] | None = None
-    friction: float | None = None
-    actuators: bool = False
-    contacts: Mapping[str, float | str] | None = None
+    limits: tuple[float, float] | None
+    friction: float | None
+    actuators: bool
+    contacts: Mapping[str, float | str] | None
 
 
-NONE = Smooth()
 _NOT_LINEAR = ("stiffnesspoly", "dampingpoly", "armature", "springyield")
 
 

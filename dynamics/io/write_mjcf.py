@@ -182,7 +182,10 @@ def _add_equality(spec: MjSpec, made: dict[str, Any], mechanism: Mechanism, loop
     module = mujoco()
     if loop.kind == "coupling":
         names = _coupled(mechanism, loop)
-        kind, held, data = "JOINT", module.mjtObj.mjOBJ_JOINT, _polynomial(loop)
+        if any(map(float, loop.coefficients[_DEGREE + 1 :])):
+            raise MechanismError(f"MJCF has couplings of degree {_DEGREE} at most, and loop {loop.label!r} is of more")
+        data = [*map(float, loop.coefficients), *[0.0] * _DEGREE][: _DEGREE + 1]
+        kind, held = "JOINT", module.mjtObj.mjOBJ_JOINT
     elif loop.kind in _OF_SITES:
         kind, held, data = _OF_SITES[loop.kind], module.mjtObj.mjOBJ_SITE, [0.0] * 10 + [1.0]  # torquescale of a weld
         names = [f"{loop.label} at", f"{loop.label} to"]
@@ -209,11 +212,3 @@ def _coupled(mechanism: Mechanism, loop: Loop) -> list[str]:
                 f"MJCF has a locked joint as a weld, and loop {loop.label!r} couples that of {body.name!r}"
             )
     return [body.coordinate for body in bodies]
-
-
-def _polynomial(loop: Loop) -> list[float]:
-    """The coefficients of a coupling, of all degrees that MJCF has."""
-    coefficients = [float(each) for each in loop.coefficients]
-    if any(coefficients[_DEGREE + 1 :]):
-        raise MechanismError(f"MJCF has couplings of degree {_DEGREE} at most, and loop {loop.label!r} is of more")
-    return [*coefficients, *[0.0] * _DEGREE][: _DEGREE + 1]

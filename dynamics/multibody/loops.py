@@ -141,9 +141,8 @@ def check_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> None:
     for loop in loops:
         _check_loop(loop, named)
     labels = [loop.label for loop in loops]
-    if len(set(labels)) < len(labels):
-        twice = next(label for label in labels if labels.count(label) > 1)
-        raise MechanismError(f"two loops have the name {twice!r}")
+    if twice := [label for label in labels if labels.count(label) > 1]:
+        raise MechanismError(f"two loops have the name {twice[0]!r}")
 
 
 def position_rows(

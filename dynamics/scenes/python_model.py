@@ -50,16 +50,11 @@ def python_model(name: str) -> Model:
     if not what:
         raise ValueError(f"{source!r:.200} is a Python file: name the model in it, as in {source + ':system'!r:.200}")
     of_file = source.endswith(SUFFIX)
+    if Path(source).is_dir() and (of_file or not Path(source, "__init__.py").is_file()):
+        more = "" if of_file else f", as in {source + '/model.py:system'!r:.200}"
+        raise ValueError(f"{source!r:.200} is a folder, and a model is in a file{more}")
     if of_file and not Path(source).is_file():
-        raise ValueError(
-            f"{source!r:.200} is a folder, and a model is in a file"
-            if Path(source).is_dir()
-            else f"there is no file {source!r:.200}"
-        )
-    if not of_file and Path(source).is_dir() and not Path(source, "__init__.py").is_file():
-        raise ValueError(
-            f"{source!r:.200} is a folder, and a model is in a file, as in {source + '/model.py:system'!r:.200}"
-        )
+        raise ValueError(f"there is no file {source!r:.200}")
     folder = Path(source).resolve().parent if of_file else Path.cwd()
     with _first_on_path(folder), redirect_stdout(sys.stderr):
         module = _told(source, lambda: _executed(Path(source)) if of_file else importlib.import_module(source))

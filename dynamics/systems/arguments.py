@@ -5,7 +5,7 @@ import math
 import numbers
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from types import CodeType, FunctionType
+from inspect import Signature
 from typing import Any, NoReturn
 
 import numpy as np
@@ -137,12 +137,13 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
     names = f"({state}, t) or ({state}, t, p)"
     if not is_function(function):
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
+    signature = inspect.signature(function)
     for chosen, last in ((arguments, "p"), (arguments[:-1], "t")):
-        if _takes(function, len(chosen)) and not _keeps(function, len(chosen) - 1, last):
+        if _takes(signature, len(chosen)) and not _keeps(signature, len(chosen) - 1, last):
             break
     else:
-        raise TypeError(f"{what} must take {names}, got {inspect.signature(function)}")
-    _require_order(what, function, names)
+        raise TypeError(f"{what} must take {names}, got {signature}")
+    _require_order(what, signature, names)
     token = formulating.set(True)
     try:
         return function(*chosen)
@@ -156,41 +157,29 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
         formulating.reset(token)
 
 
-def _require_order(what: str, function: Callable[..., object], names: str) -> None:
+def _require_order(what: str, signature: Signature, names: str) -> None:
     """Raises TypeError for arguments of these names in other places, such as (t, x) or, of constraints, (q, qd, t)."""
     right = names.rpartition("(")[2].rstrip(")").split(", ")
-    given = [*inspect.signature(function).parameters][: len(right)]
+    given = [*signature.parameters][: len(right)]
     wrong = [name for name, place in zip(given, right, strict=False) if name in {*right, "qd"} - {place}]
     if [name for name in wrong if name != "p" or given.index("p") == right.index("t")]:
         more = "; conditions on velocities belong to velocity_constraints=" if what == "constraints" else ""
         raise TypeError(f"{what} must take {names}, in this order, got ({', '.join(given)}){more}")
 
 
-def _takes(function: Callable[..., object], count: int) -> bool:
+def _takes(signature: Signature, count: int) -> bool:
     """Whether the function can be called with so many arguments."""
-    if (code := _plain_code(function)) is not None:
-        return 0 <= code.co_argcount - count <= len(function.__defaults__ or ())
     try:
-        inspect.signature(function).bind(*[None] * count)
+        signature.bind(*[None] * count)
     except TypeError:
         return False
     return True
 
 
-def _keeps(function: Callable[..., object], place: int, name: str) -> bool:
+def _keeps(signature: Signature, place: int, name: str) -> bool:
     """Whether the function's argument at this place has a default and another name: a value that is kept."""
-    if _plain_code(function) is not None and not function.__defaults__:
-        return False
-    taken = [*inspect.signature(function).parameters.values()][place : place + 1]
+    taken = [*signature.parameters.values()][place : place + 1]
     return any([each.default is not each.empty and each.name != name for each in taken])
-
-
-def _plain_code(function: Callable[..., object]) -> CodeType | None:
-    """The code of a function of positional arguments alone, which tells its signature sooner than `inspect` does."""
-    if type(function) is not FunctionType or hasattr(function, "__wrapped__"):
-        return None
-    code = function.__code__
-    return None if code.co_kwonlyargcount or code.co_flags & inspect.CO_VARARGS else code
 
 
 def require_known(what: str, nodes: Iterable[Node], known: Collection[Node], otherwise: str) -> None:

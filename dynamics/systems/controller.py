@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -18,11 +18,7 @@ from .system import System, generalized_forces
 SYSTEMS_KEPT = 16  # systems that stay for another run
 
 
-class Controlled(NamedTuple):
-    """A system with a controller, and the controller's forces alone, n nodes."""
-
-    system: System
-    forces: tuple[Node, ...]
+Controlled = tuple[System, tuple[Node, ...]]  # a system with a controller, and the controller's forces alone, n nodes
 
 
 def with_controller(
@@ -64,7 +60,7 @@ def with_controller(
     >>> A.round(3).tolist()
     [[0.0, 1.0], [-74.422, -9.0]]
     """
-    return controlled(as_equations(model), controller, parameters).system
+    return controlled(as_equations(model), controller, parameters)[0]
 
 
 def controlled(
@@ -105,7 +101,7 @@ def _controlled(request: _Request) -> Controlled:
     system, forces = request.system, request.forces
     pairs = zip(system.forces, forces, strict=True)
     both = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
-    return Controlled(system.changed(parameters=system.parameters | dict(request.gains), forces=both), forces)
+    return system.changed(parameters=system.parameters | dict(request.gains), forces=both), forces
 
 
 def with_closed_form(model: Equations, tau: Any, parameters: object) -> tuple[Equations, Any, Sequence[Node] | None]:
@@ -117,5 +113,5 @@ def with_closed_form(model: Equations, tau: Any, parameters: object) -> tuple[Eq
     if not is_function(tau):
         return model, tau, None if model.system is None else model.system.tau
     given = parameters if isinstance(parameters, Mapping) else {}
-    closed = controlled(model, tau, {name: 0.0 for name in given if name not in model.parameters})
-    return closed.system, 0.0, closed.forces
+    closed, forces = controlled(model, tau, {name: 0.0 for name in given if name not in model.parameters})
+    return closed, 0.0, forces

@@ -231,7 +231,9 @@ class _Checks:
         graphs = {"L": self.graph({"L": self.system.lagrangian}), "tau": self.inverse}
         if self.held.any:
             yield self.held.closed(self.accelerations, self.inertia, np.abs(self.held_by).sum(axis=-1))
-            graphs["the constraints and their rates"] = self.graph(self.held.rows)
+            constraints = self.system.constraints
+            rows = enumerate([*constraints.positions, *constraints.rates])
+            graphs["the constraints and their rates"] = self.graph({f"{k}": row for k, row in rows})
         for name, graph in graphs.items():
             yield self._differences(f"AD: slope of {name} along a line = differences", graph)
 

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-import cgraph as cg
 from cgraph import Graph
 from cgraph._shared import Array
 from cgraph.extend import Builder, cotangents
@@ -79,13 +78,6 @@ class Held:
     def __init__(self, system: System, value: Callable[[Graph], Array]) -> None:
         self.system, self.value = system, value
         self.any = bool(len(system.constraints))
-
-    @property
-    def rows(self) -> dict[str, cg.Node]:
-        """phi and the rates of all rows."""
-        constraints = self.system.constraints
-        rows = {f"phi{k}": phi for k, phi in enumerate(constraints.positions)}
-        return rows | {f"rate{k}": rate for k, rate in enumerate(constraints.rates)}
 
     @cached_property
     def matrix(self) -> Array:

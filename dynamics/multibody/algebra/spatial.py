@@ -9,14 +9,14 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
 from cgraph import Node
 from cgraph._shared import Array
 from cgraph.extend import as_node
 
+from ...systems.kinematics import ZERO as ZERO, dot as dot  # noqa: PLC0414 (of triples, too)
+
 Triple = tuple[Node, Node, Node]
 Matrix = Sequence[Sequence[float | Node]]  # (3, 3)
-ZERO = cg.constant(0.0)
 STILL: Triple = (ZERO, ZERO, ZERO)
 SNAP = 1e-14  # of length 1: a component of a rotation that is no more comes from a quarter turn, or one in text
 SUM_ROUNDING = 2.0**-48  # of the terms of a sum: what is left is their rounding if it is no more
@@ -136,27 +136,12 @@ def to_z(axis: Array) -> Array:
     return snapped(np.column_stack([x, np.cross(axis, x), axis]))
 
 
-def joint_placement(outer: Array, orientation: ArrayLike, position: ArrayLike, axes: Array) -> tuple[Array, Triple]:
-    """Placement of a joint at q = 0: its `axes` as columns and its origin, both in the parent's axes `outer`."""
-    return snapped(outer.T @ np.asarray(orientation) @ axes), constant(product(outer.T, np.asarray(position)))
-
-
 def parallel_axis(inertia: Array, mass: float | Node, offset: Array) -> Array:
     """Inertia about a point `offset` away from the center of mass (parallel axes)."""
     x, y, z = offset
     return added(inertia, mass * np.array([[y * y + z * z, -x * y, -x * z],
                                            [-x * y, x * x + z * z, -y * z],
                                            [-x * z, -y * z, x * x + y * y]]))  # fmt: skip
-
-
-def total(terms: Sequence[Node]) -> Node:
-    """The sum of nodes, 0 for none."""
-    return sum(terms, ZERO)
-
-
-def dot(a: Triple, b: Triple) -> Node:
-    """Scalar product."""
-    return total([x * y for x, y in zip(a, b, strict=True)])
 
 
 def cross(a: Triple, b: Triple) -> Triple:
@@ -183,13 +168,12 @@ def constant(vector: Array) -> Triple:
 
 def rotate_transpose(matrix: Matrix, vector: Triple) -> Triple:
     """matrix^T vector: what a parent's vector is in a child's axes, the columns of `matrix`."""
-    x, y, z = (total([matrix[i][j] * vector[i] for i in range(3)]) for j in range(3))
-    return x, y, z
+    return rotate([*zip(*matrix, strict=True)], vector)
 
 
 def rotate(matrix: Matrix, vector: Triple) -> Triple:
     """matrix vector: what a child's vector is in its parent's axes."""
-    x, y, z = (total([row[i] * vector[i] for i in range(3)]) for row in matrix)
+    x, y, z = (sum([row[i] * vector[i] for i in range(3)], ZERO) for row in matrix)
     return x, y, z
 
 

@@ -113,7 +113,7 @@ class MatrixTurn(NamedTuple):
         new = [[ZERO] * 3 for _ in range(3)]
         for i in range(3):
             for j in range(i + 1):
-                new[i][j] = new[j][i] = spatial.total([self.rows[i][k] * half[k][j] for k in range(3)])
+                new[i][j] = new[j][i] = sum([self.rows[i][k] * half[k][j] for k in range(3)], ZERO)
         return new
 
 

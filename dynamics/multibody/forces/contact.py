@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, NamedTuple
 
@@ -16,12 +16,13 @@ from cgraph.extend import as_node
 from ..algebra import spatial
 from ..algebra.spatial import Triple, cross, dot, plus, scaled
 from ..bodies.body import WORLD, MechanismError, quantity, unit_axis, unknown_body, vector
-from ..parameters import Quantity, names_in, symbol, vanishes
+from ..parameters import Quantity, symbol, vanishes
 from ..sweeps.kinematic_chain import KinematicChain
+from .external_force import HasParameters
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class Contact(HasParameters):
     """Compliant contact of a point or sphere of a body with a plane, or with a sphere, of another or the world.
 
     With the depth x, how far the surfaces would go through each other, and the velocity v of the body against the
@@ -104,14 +105,9 @@ class Contact:
     velocity: Quantity = 0.0
 
     @property
-    def components(self) -> tuple[str, ...]:
-        """Names of parameters that are 0 without a value: none."""
-        return ()
-
-    @property
-    def names(self) -> set[str]:
-        """Set of the names of its parameters."""
-        return set(names_in([getattr(self, name) for name in CONTACT_QUANTITIES]))
+    def quantities(self) -> Mapping[str, Callable[[str, object], object]]:
+        """Those of stiffness, dissipation and friction."""
+        return CONTACT_QUANTITIES
 
     @property
     def label(self) -> str:

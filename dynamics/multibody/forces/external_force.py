@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import topological
 
 from ..algebra.spatial import Triple
 from ..bodies.body import MechanismError, unknown_body, vector
+from ..parameters import names_in
 from ..sweeps.kinematic_chain import KinematicChain
 
 FORCE = "force"  # tag
@@ -24,8 +24,27 @@ FRAMES = ("world", "body")
 Component = Node | float | str
 
 
+class HasParameters:
+    """Base of forces: what of them may be parameters, and the names of these."""
+
+    @property
+    def components(self) -> tuple[Component, ...]:
+        """Names of the parameters that it uses, and that are 0 without a value; of one of your own what it reads."""
+        return ()
+
+    @property
+    def quantities(self) -> Mapping[str, Callable[[str, object], object]]:
+        """Fields that may be parameters, and the checks of their values."""
+        return {}
+
+    @property
+    def names(self) -> set[str]:
+        """Set of the names of its parameters and variables."""
+        return set(names_in([*self.components, *[getattr(self, name) for name in self.quantities]]))
+
+
 @dataclass(frozen=True, eq=False)
-class Force:
+class Force(HasParameters):
     """A force on a body at a point, and a torque on the body, from outside the mechanism.
 
     Parameters
@@ -59,13 +78,6 @@ class Force:
     def components(self) -> tuple[Component, ...]:
         """The six components, force first."""
         return (*self.value, *self.torque)
-
-    @property
-    def names(self) -> set[str]:
-        """Names of the parameters and variables that it uses."""
-        variables = topological([each for each in self.components if isinstance(each, Node)])
-        named = {str(node.name) for node in variables if node.name}
-        return named | {each for each in self.components if isinstance(each, str)}
 
 
 def check_force(force: Force, bodies: Collection[str]) -> None:

@@ -20,16 +20,16 @@ from ..algebra.spatial import ZERO
 from ..bodies.body import Body, MechanismError, quantity, unknown_body
 from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
-from ..parameters import Quantity, names_in, symbol
+from ..parameters import Quantity, symbol
 from ..sweeps.kinematic_chain import KinematicChain
 from .contact import Contact, check_contact, touch
-from .external_force import FORCE, Force, check_force, powers
+from .external_force import FORCE, Force, HasParameters, check_force, powers
 
 Range = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class JointForce(ABC):
+class JointForce(HasParameters, ABC):
     """A force along the freedoms of a joint, smooth or with kinks, one of the `forces` of a mechanism.
 
     On a joint that is locked it has no effect. `JointSpring`, `JointLimit`, `JointFriction` and `Actuator` are such;
@@ -63,21 +63,6 @@ class JointForce(ABC):
     def shares(self) -> Mapping[str, float]:
         """{body: how far its joint moves the coordinate of the force}."""
         return {self.body: 1.0} if isinstance(self.body, str) else self.body
-
-    @property
-    def components(self) -> tuple[str, ...]:
-        """Names of the parameters that it uses, and that are 0 without a value; of one of your own what it reads."""
-        return ()
-
-    @property
-    def quantities(self) -> Mapping[str, Callable[[str, object], object]]:
-        """Fields that may be parameters, and the checks of their values."""
-        return {}
-
-    @property
-    def names(self) -> set[str]:
-        """Set of the names of its parameters."""
-        return {*self.components, *names_in([getattr(self, name) for name in self.quantities])}
 
     @property
     def label(self) -> str:
@@ -366,7 +351,12 @@ def generalized_forces(
     for force in forces:
         if isinstance(force, Force | Contact):
             with building(build), cg.tag(force.body, FORCE):
-                shares = cotangents(gathered(_powers(force, chain, parameters)), qd, build)
+                if isinstance(force, Force):
+                    pairs = powers(force, chain(force.body), parameters)
+                else:
+                    at_touch = touch(force, chain(force.body), chain(force.to))
+                    pairs = [*zip(at_touch.velocity, at_touch.force, strict=True)]
+                shares = cotangents(gathered(pairs), qd, build)
                 total = [sum_ + share for sum_, share in zip(total, shares, strict=True)]
     where = {body.name: place for body, place in zip(moving, places(moving), strict=True)}
     for force in [each for each in forces if isinstance(each, JointForce)]:
@@ -382,13 +372,3 @@ def generalized_forces(
                 for k, node in zip(range(at.u.start, at.u.stop), along, strict=True):
                     total[k] = total[k] + share * node
     return total
-
-
-def _powers(
-    force: Force | Contact, chain: Callable[[str], KinematicChain], parameters: Mapping[str, Node]
-) -> list[tuple[Node, Node]]:
-    """Velocities, and the forces on them."""
-    if isinstance(force, Force):
-        return powers(force, chain(force.body), parameters)
-    state = touch(force, chain(force.body), chain(force.to))
-    return list(zip(state.velocity, state.force, strict=True))

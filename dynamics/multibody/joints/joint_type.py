@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -157,17 +157,17 @@ class AxialJoint(JointType):
     @property
     def turns(self) -> bool:
         """Whether a coordinate turns the body."""
-        return self._turned(1.0) != 0.0
+        return _at(self.angle, 1.0) != 0.0
 
     @property
     def slides(self) -> bool:
         """Whether a coordinate moves the body along the axis."""
-        return self._shifted(1.0) != 0.0
+        return _at(self.shift, 1.0) != 0.0
 
     @property
     def measured_about_axis(self) -> bool:
         """Whether the coordinate is the angle about the axis and nothing else."""
-        return self._turned(1.0) == 1.0 and not self.slides
+        return _at(self.angle, 1.0) == 1.0 and not self.slides
 
     def stretches(self, q: Sequence[Node], reference: float | Node) -> Sequence[Node]:
         """Distance from the coordinate where the spring pulls nowhere."""
@@ -196,7 +196,7 @@ class AxialJoint(JointType):
     def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
         """A rotation about the axis and a displacement along it."""
         x = float(at[0]) if self.moves else 0.0
-        return spatial.rotation(axis, self._turned(x)) if self.turns else np.eye(3), axis * self._shifted(x)
+        return spatial.rotation(axis, _at(self.angle, x)) if self.turns else np.eye(3), axis * _at(self.shift, x)
 
     def resists(self, mass: float, inertia: Array) -> bool:
         """Mass of what slides, or inertia about the axis of what turns."""
@@ -212,15 +212,11 @@ class AxialJoint(JointType):
         alike = inertia[1, 1] * np.diag([1.0, 1.0, 0.0]) if self.turns else inertia
         return (0.0, np.zeros(3), alike) if self.slides else (mass, moment * along, alike)
 
-    def _turned(self, x: float) -> float:
-        """The angle of a coordinate that is a number."""
-        with building(Builder()):
-            return float(spatial.plain(self.angle(cg.constant(x))))
 
-    def _shifted(self, x: float) -> float:
-        """The shift of a coordinate that is a number."""
-        with building(Builder()):
-            return float(spatial.plain(self.shift(cg.constant(x))))
+def _at(function: Callable[[Node], Node], x: float) -> float:
+    """The value of `angle` or `shift` at a number."""
+    with building(Builder()):
+        return float(spatial.plain(function(cg.constant(x))))
 
 
 class SpatialJoint(JointType):

@@ -15,7 +15,7 @@ from cgraph._shared import Array
 
 from ...equations.states.initial_value import normalized
 from ...systems.model import Model
-from ..trees.mechanism import Mechanism, require_mechanism
+from ..trees.mechanism import require_mechanism
 from .body_quantity import of_bodies
 from .regressor import PARAMETERS, regressor
 
@@ -76,7 +76,12 @@ def base_parameters(model: Model) -> BaseParameters:
     ('mx of link 1', 'mz of link 1', 'Iyy of link 1')
     """
     mechanism = require_mechanism(model, "base_parameters").bind()
-    matrix = _stacked(mechanism)
+    graph, system = regressor(mechanism), mechanism.system
+    drawn = np.random.default_rng(0).normal(size=(SAMPLES, len(graph.inputs)))
+    drawn[:, : system.nq] = normalized(mechanism, drawn[:, : system.nq + system.n])[:, : system.nq]
+    values = graph.evaluate(dict(zip(graph.input_names, drawn.T, strict=True))).values()
+    table = np.stack([np.broadcast_to(column, SAMPLES) for column in values], axis=1)
+    matrix = table.astype(np.float64).reshape(SAMPLES * system.n, -1)  # the regressors, one below the other
     lengths = np.linalg.norm(matrix, axis=0)
     shown = np.flatnonzero(lengths > 0.0)
     unit = matrix[:, shown] / lengths[shown]
@@ -95,13 +100,3 @@ def base_parameters(model: Model) -> BaseParameters:
     grouping[:, shown] = shares * lengths[shown] / lengths[columns][:, None]
     names = [f"{PARAMETERS[k % 10]} of {mechanism.moving[k // 10].name}" for k in columns.tolist()]
     return BaseParameters(tuple(names), columns, grouping)
-
-
-def _stacked(mechanism: Mechanism) -> Array:
-    """The regressor at random states, one below the other, (SAMPLES n, 10 n)."""
-    graph, system = regressor(mechanism), mechanism.system
-    drawn = np.random.default_rng(0).normal(size=(SAMPLES, len(graph.inputs)))
-    drawn[:, : system.nq] = normalized(mechanism, drawn[:, : system.nq + system.n])[:, : system.nq]
-    columns = graph.evaluate(dict(zip(graph.input_names, drawn.T, strict=True))).values()
-    table = np.stack([np.broadcast_to(column, SAMPLES) for column in columns], axis=1)
-    return np.asarray(table, dtype=np.float64).reshape(SAMPLES * system.n, -1)

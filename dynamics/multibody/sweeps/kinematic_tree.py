@@ -58,10 +58,13 @@ def lock_joints(bodies: Sequence[Body], at: Mapping[str, float | ArrayLike]) -> 
     by_name = {body.name: body for body in bodies}
     welds: dict[str, Joint] = {}
     for name, value in at.items():
-        body = by_name[name]
-        if not body.joint.type.moves:
+        joint = by_name[name].joint
+        if not joint.type.moves:
             raise MechanismError(f"body {name!r} is welded on and has no joint to lock")
-        welds[name] = _weld_at(body.joint, locked_at(body, value))
+        orientation, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
+        turn, shift = joint.type.placement(axis, locked_at(by_name[name], value))
+        place = spatial.placed(position, orientation, shift)
+        welds[name] = Joint("fixed", position=place, orientation=spatial.snapped(orientation @ turn))
     return [replace(body, joint=welds[body.name]) if body.name in welds else body for body in bodies]
 
 
@@ -81,14 +84,6 @@ def locked_at(body: Body, value: Any) -> Array:
         if (groups == group).sum() > 1 and not np.any(at[groups == group]):
             raise MechanismError(f"{where}: a quaternion must not be zero, got {value!r:.80}")
     return at
-
-
-def _weld_at(joint: Joint, at: Array) -> Joint:
-    """The weld that holds a joint's body where the joint has it at these coordinates."""
-    orientation, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
-    turn, shift = joint.type.placement(axis, at)
-    place = spatial.placed(position, orientation, shift)
-    return Joint("fixed", position=place, orientation=spatial.snapped(orientation @ turn))
 
 
 def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:

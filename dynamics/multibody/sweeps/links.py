@@ -224,7 +224,8 @@ def link(body: Body, parent: Body | None) -> Link:
     """The link of a checked body on its parent, None for the world."""
     axes, outer, joint = axes_of(body), axes_of(parent) if parent else np.eye(3), body.joint
     with building(Builder()), cg.tag(body.name):
-        turn, place = spatial.joint_placement(outer, joint.orientation, np.asarray(joint.position), axes)
+        turn = spatial.snapped(outer.T @ np.asarray(joint.orientation) @ axes)
+        place = spatial.constant(spatial.product(outer.T, np.asarray(joint.position)))
         mass, center, inertia = inertia_in(axes, body)
         moment = mass * center
         for other in body.welded if isinstance(body, MergedBody) else ():

@@ -158,15 +158,15 @@ def energy(motion: Motion, at: LinkState) -> Node:
     with cg.tag(KINETIC):
         translation = 0.5 * link.mass * spatial.dot(v, v)
         coupling = spatial.dot(cross(own.velocity, omega), link.moment)
-        rotation = 0.5 * spatial.total([inertia[i][i] * (omega[i] * omega[i]) for i in range(3)])
+        rotation = 0.5 * sum([inertia[i][i] * (omega[i] * omega[i]) for i in range(3)], ZERO)
         # Forward dynamics eliminates from the last term on: in these orders with the fewest and shallowest nodes.
         if motion.plane:
             terms = [rotation, translation, coupling]
         else:
             terms = [coupling, rotation] if translation.value == 0.0 else [translation, rotation, coupling]
         terms += [inertia[i][j] * (omega[i] * omega[j]) for i in range(3) for j in range(i)]
-        terms.append(0.5 * link.armature * spatial.total([velocity * velocity for velocity in at.u]))
-        kinetic = spatial.total(terms)
+        terms.append(0.5 * link.armature * sum([velocity * velocity for velocity in at.u], ZERO))
+        kinetic = sum(terms, ZERO)
     with cg.tag(POTENTIAL):
         mass, moment = link.weight
         weight = scaled(motion.strength, moment)

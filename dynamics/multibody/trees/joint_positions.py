@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,35 +16,12 @@ from ..algebra import spatial
 from ..bodies.body import Body, unit_axis
 from ..bodies.joint_coordinates import coordinate_names, places
 from ..forces.contact import Contact
-from ..loops import Loop
+from .structure import Structure
 
 _SEEN = 1e-6  # of the way that points go: how near to the plane of the picture they turn
 _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lies
 _ALIKE = 12  # digits of places [m] and directions in which two surfaces are one
 _MARK = np.full(3, 3.0**-0.5)  # from a sphere's center to its mark: seen to turn about every axis of its body
-
-
-class Bodies(Protocol):
-    """Fields of a mechanism that a drawing needs."""
-
-    @property
-    def bodies(self) -> Sequence[Body]:
-        """Tuple of all bodies."""
-
-    @property
-    def moving(self) -> Sequence[Body]:
-        """Bodies that move, parents first."""
-
-    @property
-    def loops(self) -> Sequence[Loop]:
-        """Loops that close the tree."""
-
-    @property
-    def forces(self) -> Sequence[object]:
-        """Forces, contacts among them."""
-
-    def position(self, body: str, at: ArrayLike = ...) -> Graph:
-        """Position of a point of a body: outputs x, y, z."""
 
 
 class Skeleton(NamedTuple):
@@ -66,7 +43,7 @@ class Skeleton(NamedTuple):
     surfaces: Array | None = None
 
 
-def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
+def skeleton(mechanism: Structure, q: ArrayLike) -> Skeleton:
     """Places of joints and tips for q, (T, n).
 
     A tip is a body without mass that is welded to the last moving one, or a point where a loop holds it or a contact
@@ -102,7 +79,7 @@ def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
     )
 
 
-def drawn_points(mechanism: Bodies) -> list[tuple[str, ArrayLike, int]]:
+def drawn_points(mechanism: Structure) -> list[tuple[str, ArrayLike, int]]:
     """Body and place in it of joints and tips, and the number of the earlier one that each hangs on, or -1."""
     index = {body.name: i for i, body in enumerate(mechanism.moving)}
     above = _above(mechanism)
@@ -141,7 +118,7 @@ def _hung(parents: Sequence[int], root: int) -> list[int]:
     return sorted(found)
 
 
-def _above(mechanism: Bodies) -> dict[str, str]:
+def _above(mechanism: Structure) -> dict[str, str]:
     """Nearest moving body inwards of each body; the world's name where there is none."""
     parents = {body.name: body.parent for body in mechanism.bodies}
     moving = {body.name for body in mechanism.moving}
@@ -153,7 +130,7 @@ def _above(mechanism: Bodies) -> dict[str, str]:
     return result
 
 
-def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
+def _tips(mechanism: Structure) -> Iterator[tuple[str, ArrayLike]]:
     """Body and place in it of each tip, in the order of the moving bodies that have them."""
     above, carrying = _above(mechanism), {body.parent for body in mechanism.bodies}
     moving = {body.name for body in mechanism.moving}

@@ -5,14 +5,16 @@ These have joints locked and freed, and subtrees taken off and hung on.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, NamedTuple, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph import Graph
 from cgraph._shared import HoldsNodes, kept_by_first
 
 from ..bodies.body import (
@@ -26,7 +28,7 @@ from ..bodies.body import (
     quantities,
 )
 from ..bodies.composed_joints import parts_of
-from ..forces.contact import CONTACT_QUANTITIES, Contact
+from ..forces.contact import Contact
 from ..forces.joint_force import AnyForce, JointForce
 from ..loops import Loop, coupled
 from ..parameters import Quantities, bound, entries, evaluated, names_in
@@ -84,7 +86,7 @@ class Subtree:
 
 
 @dataclass(frozen=True, eq=False)
-class Structure(HoldsNodes):
+class Structure(HoldsNodes, ABC):
     """The fields of a `Mechanism`, see there, and copies with joints locked or freed, or with other subtrees."""
 
     bodies: Sequence[Body]
@@ -96,6 +98,15 @@ class Structure(HoldsNodes):
     left_out: tuple[str, ...] = ()
     loops: Sequence[Loop] = ()
     starts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    @property
+    @abstractmethod
+    def moving(self) -> tuple[Body, ...]:
+        """The bodies that move, parents first."""
+
+    @abstractmethod
+    def position(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
+        """Position of a point of a body: outputs x, y, z."""
 
     @property
     def parameter_values(self) -> dict[str, float]:
@@ -260,21 +271,16 @@ def listed(what: str, kinds: tuple[type, ...], given: object) -> tuple[Any, ...]
     return values
 
 
-class Use(NamedTuple):
-    """A number, or an array of numbers, that is made of parameters."""
-
-    what: str
-    value: object
-    names: dict[str, None]
-    check: Callable[[str, object], object]
+Check = Callable[[str, object], object]
+Use = tuple[str, object, dict[str, None], Check]  # a quantity: what it is, its value, its parameters and its check
 
 
 def uses(bodies: Sequence[Body], gravity: Quantities, forces: Iterable[AnyForce]) -> Iterator[Use]:
     """The quantities of bodies, their joints, gravity and contacts in which there are parameters."""
     if names := names_in(entries(gravity)):
-        yield Use("gravity", gravity, names, quantities)
+        yield "gravity", gravity, names, quantities
     for force in [each for each in forces if isinstance(each, Contact | JointForce)]:
-        yield from _uses_in(force.label, force, _quantities(force))
+        yield from _uses_in(force.label, force, force.quantities)
     for body in bodies:
         yield from _uses_of(body)
 
@@ -285,16 +291,16 @@ def _uses_of(body: Body) -> tuple[Use, ...]:
     return (*_uses_in(where, body, BODY_QUANTITIES), *_uses_in(where, body.joint, JOINT_QUANTITIES))
 
 
-def _uses_in(where: str, owner: object, checks: Mapping[str, Callable[[str, object], object]]) -> Iterator[Use]:
+def _uses_in(where: str, owner: object, checks: Mapping[str, Check]) -> Iterator[Use]:
     for name, check in checks.items():
         if names := names_in(entries(value := getattr(owner, name))):
-            yield Use(f"{where}: {name}", value, names, check)
+            yield f"{where}: {name}", value, names, check
 
 
 def used_names(bodies: Sequence[Body], gravity: Quantities, forces: Sequence[AnyForce]) -> dict[str, None]:
     """The names that occur in forces, and then those in bodies and gravity."""
     result = dict.fromkeys([name for force in forces for name in force.names])
-    return result | {name: None for use in uses(bodies, gravity, forces) for name in use.names}
+    return result | {name: None for _, _, names, _ in uses(bodies, gravity, forces) for name in names}
 
 
 def require_values(
@@ -304,35 +310,30 @@ def require_values(
 
     A parameter of a `Force` is 0 by default; a mass or stiffness that is would be another mechanism.
     """
-    for use in uses(bodies, gravity, forces):
-        if missing := [name for name in use.names if name not in values]:
-            raise MechanismError(f"{use.what} has the parameter {missing[0]!r}, which needs a value in `parameters`")
-        at = {name: np.asarray(values[name], dtype=np.float64) for name in use.names}
-        rows = evaluated(use.value, at)
+    for what, value, names, check in uses(bodies, gravity, forces):
+        if missing := [name for name in names if name not in values]:
+            raise MechanismError(f"{what} has the parameter {missing[0]!r}, which needs a value in `parameters`")
+        at = {name: np.asarray(values[name], dtype=np.float64) for name in names}
+        rows = evaluated(value, at)
         varied, looked_at = any([each.ndim for each in at.values()]), [0]
         if varied:
             from ..bodies.many_values import unsure  # which one set of values does not need
 
-            looked_at = unsure(use.check, rows)
+            looked_at = unsure(check, rows)
         for k in looked_at:
             row = rows[k] if varied else rows
             try:
-                use.check(use.what, row.item() if row.ndim == 0 else row)
+                check(what, row.item() if row.ndim == 0 else row)
             except MechanismError as error:
                 shown = {name: each[k] if each.ndim else each for name, each in at.items()}
-                listed = ", ".join([f"{name} = {float(value)!r}" for name, value in shown.items()])
+                listed = ", ".join([f"{name} = {float(number)!r}" for name, number in shown.items()])
                 of = f" of trajectory {k}" if varied else ""
                 raise MechanismError(f"{error}, where {listed}{of}") from None
 
 
-def _quantities(force: Contact | JointForce) -> Mapping[str, Callable[[str, object], object]]:
-    """The checks of fields that may be parameters."""
-    return CONTACT_QUANTITIES if isinstance(force, Contact) else force.quantities
-
-
 def bound_body(body: Body, values: Mapping[str, float]) -> Body:
     """The body with numbers in place of these parameters; itself where it has none of them."""
-    if not any([use.names.keys() & values.keys() for use in _uses_of(body)]):
+    if not any([names.keys() & values.keys() for _, _, names, _ in _uses_of(body)]):
         return body
     own = {name: bound(getattr(body, name), values) for name in BODY_QUANTITIES}
     joint = {name: bound(getattr(body.joint, name), values) for name in JOINT_QUANTITIES}
@@ -344,7 +345,7 @@ def bound_force(force: AnyForce, values: Mapping[str, float]) -> AnyForce:
     if not force.names & values.keys():
         return force
     if isinstance(force, Contact | JointForce):
-        numbers = {name: bound(getattr(force, name), values) for name in _quantities(force)}
+        numbers = {name: bound(getattr(force, name), values) for name in force.quantities}
         return replace(force, **numbers) if numbers else force
     value, torque = ([bound(each, values) for each in three] for three in (force.value, force.torque))
     return replace(force, value=value, torque=torque)

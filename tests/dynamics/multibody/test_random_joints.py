@@ -94,7 +94,7 @@ class Random(SpatialJoint):
         return Twist(omega, velocity)
 
     def rate(self, q: Nodes, u: Nodes) -> Nodes:
-        return [spatial.total([float(g) * x for g, x in zip(row, u, strict=True)]) for row in self.mixing]
+        return [sum([float(g) * x for g, x in zip(row, u, strict=True)], spatial.ZERO) for row in self.mixing]
 
     def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
         raise NotImplementedError
