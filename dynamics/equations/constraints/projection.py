@@ -16,6 +16,7 @@ from cgraph import Graph, Node, extend
 from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Builder, building, folded
 
+from ...systems.arguments import new_variables
 from ...systems.constraints import ConstraintError
 from ...systems.kinematics import ZERO
 from ...systems.system import System
@@ -23,7 +24,7 @@ from ..substitute import substitute
 from .constraint_rank import ConstraintWarning, independent_rows
 from .constraints import Rows
 from .nearly_redundant_rows import lost_rank, opened
-from .row_numbers import row_numbers, step_names
+from .row_numbers import row_numbers
 
 ITERATIONS = 20  # of Newton's method
 SPARE = 1.5  # certain digits of a row that is not 0: a start that is off by 30 roundings is moved and said to be
@@ -125,7 +126,7 @@ def projected_start(system: System, x: Array, t: float, parameters: Mapping[str,
 def _all_rows(system: System) -> Graph:
     """phi and the rates of all constraints at x + step; inputs x, t if needed, parameters, and the steps."""
     state = [*system.q, *system.qd]
-    steps = cg.variables(step_names(len(state), system.parameters))
+    steps = new_variables("d", len(state), system.parameters)
     positions, rates = system.constraints.positions, system.constraints.rates
     names = [*[f"phi{k}" for k in range(len(positions))], *[f"rate{k}" for k in range(len(rates))]]
     with building(Builder()):
