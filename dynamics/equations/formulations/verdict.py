@@ -20,7 +20,7 @@ from ...systems.kinematics import ONE
 from ...systems.model import Model, as_system, display_names
 from ...systems.system import System
 from ..equation import documented
-from .blame import Derive, Split, blame, split
+from .blame import Derive, blame, split
 from .lagrange_terms import THROUGH_STEP, formulation_name, torques
 from .off import Off, off_at
 from .verdict_state import STATES, asked_state, chosen_state, numbers_of
@@ -315,7 +315,7 @@ def formulation_verdict(
     values = {name: there.get(name, 0.0) for name in terms.outputs if name in found or name in there}
     marked = split(system, formulation, torques)
     faults = blame(system, formulation, torques, graph, marked)
-    wrong, right = (_torques(marked, state, through) for through in (1.0, 0.0))
+    wrong, right = (_torques(*marked, state, factor) for factor in (1.0, 0.0))
     called = Names(terms, names)
 
     def term(name: str, sign: int) -> Excess:
@@ -364,9 +364,9 @@ def _step(slope: str) -> str:
     return f"q = {'G ' * slope.startswith('G')}qd dt + q_old"
 
 
-def _torques(marked: Split, at: Mapping[str, float], through: float) -> dict[str, float]:
+def _torques(graph: Graph, through: Node, at: Mapping[str, float], factor: float) -> dict[str, float]:
     """The torques as dt tends to 0, with what comes through the step times a factor; what rounding alone made is 0."""
-    graph, given = marked.graph, {"dt": 0.0, str(marked.through.name): through}
+    given = {"dt": 0.0, str(through.name): factor}
     known = {name: given[name] if name in given else at[name.removesuffix("_old")] for name in graph.input_names}
     digits, values = extend.certain_digits(graph, known), graph.evaluate(known)
     return {name: float(value) if digits[name] >= 1.0 else 0.0 for name, value in values.items()}
