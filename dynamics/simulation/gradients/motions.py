@@ -17,7 +17,7 @@ from cgraph.extend import Builder, topological
 
 from ...equations.state_equation import FORMS, StateInputs, state_inputs
 from ...equations.states.initial_value import initial_values
-from ...integrators import Problem, derive, in_form, quantity
+from ...integrators import Problem, derive, in_form, quantity, quantity_inputs
 from ...integrators.rate_in_modes import switched
 from ...systems.arguments import TIME, Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
@@ -391,7 +391,8 @@ def _with_loss_parameters(own: Equations, parameters: object, loss: Loss | None,
     state = [cg.variables(list(own.coordinates))] if system is None else [system.q, system.qd]
     force = [] if system is None else [list(system.tau)]
     called = [("loss", loss, state), ("running", running, [*state, *force])]
-    read = [call_user_function(what, each, *at, t, p) for what, each, at in called if each is not None]
+    kind = "x" if system is None else "q, qd, tau"
+    read = [call_user_function(what, each, *at, t, p, state=kind) for what, each, at in called if each is not None]
     used = {node.name for node in topological([node for node in read if isinstance(node, Node)])}
     extended = dict(own.parameters) | {name: 0.0 for name in new if name in used}
     if system is not None:
@@ -405,17 +406,13 @@ def _loss_graph(problem: Problem, what: str, loss: Loss | None, tau: Sequence[No
     if loss is None:
         return None
     node = quantity(problem, what, loss, tau, constant=True)
-    order = topological([node])
-    places = {each: k for k, each in enumerate(order)}
-    leaves = [each.name if each.value is None else float(each.value).hex() for each in order]  # 0.0 and -0.0 apart
-    key = [(each.op.name, leaf, *[places[arg] for arg in each.args]) for each, leaf in zip(order, leaves, strict=True)]
-    if not (kept := _place(problem, tuple(key))):
+    if not (kept := _place(problem, cg.structure_hash(Graph(quantity_inputs(problem), {"loss": node})))):
         kept.append(problem.observed({"loss": node}))
     return kept[0]
 
 
 @memo(LOSSES_KEPT)
-def _place(problem: Problem, key: tuple[object, ...]) -> list[Graph]:
+def _place(problem: Problem, key: str) -> list[Graph]:
     """Place for the graph of a loss of these operations."""
     return []
 
