@@ -103,13 +103,6 @@ def unknown_names(system: System) -> list[str]:
     return [*[f"coordinate {name!r}" for name in system.velocities], *names]
 
 
-def require_no_constraints(system: System) -> None:
-    """Raises ValueError for a system with constraints: their multipliers have no place in the balanced order."""
-    if len(system.constraints):
-        name = system.constraints.names[0]
-        raise ValueError(f'method "balanced" needs a system without constraints, got constraint {name!r}')
-
-
 def multiplier_outputs(system: System, rows: Rows, solved: Sequence[Node], build: Builder) -> dict[str, Node]:
     """lambda0.. of all rows from s of the independent ones; 0 of those that follow from others."""
     with building(build):

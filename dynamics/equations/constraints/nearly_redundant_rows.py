@@ -70,8 +70,6 @@ def left_without(constraints: Constraints, matrices: Sequence[Array], tolerance:
 
 def left_at(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float], tolerance: float) -> Left:
     """`left_without` at one state."""
-    if not len(constraints):
-        return Left([], np.zeros(0), np.zeros(0))
     numbers = row_numbers(constraints)
     return left_without(constraints, [numbers.matrix(numbers.point(q, {"t": t, **parameters}))], tolerance)
 

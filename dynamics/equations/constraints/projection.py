@@ -18,7 +18,7 @@ from cgraph.extend import Builder, building, folded
 
 from ...systems.arguments import new_variables
 from ...systems.constraints import ConstraintError
-from ...systems.kinematics import ZERO
+from ...systems.kinematics import ZERO, numbered_graph
 from ...systems.system import System
 from ..substitute import substitute
 from .constraint_rank import ConstraintWarning, independent_rows
@@ -128,11 +128,10 @@ def _all_rows(system: System) -> Graph:
     state = [*system.q, *system.qd]
     steps = new_variables("d", len(state), system.parameters)
     positions, rates = system.constraints.positions, system.constraints.rates
-    names = [*[f"phi{k}" for k in range(len(positions))], *[f"rate{k}" for k in range(len(rates))]]
     with building(Builder()):
         moved = {x: x + step for x, step in zip(state, steps, strict=True)}
     rows = substitute([*positions, *rates], moved)
-    return Graph([*state, *system.extra_inputs, *steps], dict(zip(names, rows, strict=True)))
+    return numbered_graph([*state, *system.extra_inputs, *steps], rows)
 
 
 def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Mapping[str, float]) -> list[int]:
@@ -151,10 +150,11 @@ def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Ma
     numbers = row_numbers(system.constraints)
     rows, columns = numbers.scales(numbers.point(x[: system.nq], {"t": t, **parameters}))
     fastest = float(np.abs(x[system.nq :] / columns).max(initial=0.0))
-    for name, value in values.items():
-        k = int(name.removeprefix("phi").removeprefix("rate"))
+    count = len(system.constraints.positions)
+    for i, (name, value) in enumerate(values.items()):
+        k = i if i < count else i - count
         most = SPARE if k in kept else FOLLOWS
-        small = name.startswith("rate") and abs(rows[k] * value) <= NO_RATE * fastest
+        small = i >= count and abs(rows[k] * value) <= NO_RATE * fastest
         if value != 0.0 and not small and not (digits[name] < most and np.isfinite(value)):
             left.add(k)
     return sorted(left)
