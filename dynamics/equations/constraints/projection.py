@@ -7,7 +7,7 @@ Both are solved by the matrix of the equations of motion, see `constraints`.
 """
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from ...systems.kinematics import ZERO, numbered_graph
 from ...systems.system import System
 from ..substitute import substitute
 from .constraint_rank import ConstraintWarning, independent_rows
-from .constraints import Rows
+from .constraints import constraint_rows
 from .nearly_redundant_rows import lost_rank, opened
 from .row_numbers import row_numbers
 
@@ -48,29 +48,25 @@ def projection(system: System) -> Graph | None:
     kept = independent_rows(constraints)
     holonomic = tuple([k for k in kept if k < len(positions)])
     q, u = system.q, system.qd
+
+    def correction(these: tuple[int, ...], gaps: Sequence[Node]) -> list[Node]:
+        """The shortest displacement that takes gaps off these rows."""
+        with building(build):
+            rhs = [*[ZERO] * system.n, *[-gaps[k] for k in these]]
+        rows = constraint_rows(system, rates, these)
+        return rows.solve(system, lagrangian, rhs, build, written=written)[: system.n]
+
     moved = list(q)
     if holonomic:
-        rows = Rows.of(holonomic, rates)
-        shift = _correction(system, lagrangian, rows, [positions[k] for k in holonomic], written, build)
+        shift = correction(holonomic, positions)
         with building(build):
             moved = [x + step for x, step in zip(q, kinematics.rate(shift), strict=True)]
     with building(build):
         moved = kinematics.normalized(moved)
-    rows = Rows.of(kept, rates)
-    change = _correction(system, lagrangian, rows, rows.rates, written, build)
-    change = substitute(change, dict(zip(q, moved, strict=True)))
+    change = substitute(correction(kept, rates), dict(zip(q, moved, strict=True)))
     with building(build):
         velocities = [velocity + step for velocity, step in zip(u, change, strict=True)]
     return cg.simplify(system.graph({f"x{k}": x for k, x in enumerate([*moved, *velocities])}, q, u))
-
-
-def _correction(
-    system: System, lagrangian: Node, rows: Rows, gaps: list[Node], written: Builder, build: Builder
-) -> list[Node]:
-    """The shortest displacement that takes gaps off the rows."""
-    with building(build):
-        rhs = [*[ZERO] * system.n, *[-gap for gap in gaps]]
-    return rows.solve(system, lagrangian, rhs, build, written=written)[: system.n]
 
 
 def projected(system: System, x: Array, t: float, parameters: Mapping[str, float]) -> Array:
