@@ -35,8 +35,11 @@ if TYPE_CHECKING:
     from .equations.linearization.inverse_dynamics_derivatives import (
         inverse_dynamics_derivatives as inverse_dynamics_derivatives,
     )
-    from .equations.linearization.linearization import linearize as linearize, state_space as state_space
-    from .equations.linearization.linearize_many import linearize_many as linearize_many
+    from .equations.linearization.linearization import (
+        linearize as linearize,
+        linearize_many as linearize_many,
+        state_space as state_space,
+    )
     from .equations.linearization.reduced_linearization import reduced_linearization as reduced_linearization
     from .equations.mass_matrix.singular_mass_matrix import (
         SingularMassMatrixError as SingularMassMatrixError,

@@ -75,8 +75,7 @@ def coriolis_matrix(
 def require_quadratic(system: System) -> None:
     """Raises ValueError unless L is quadratic in the velocities, that is, M does not depend on them."""
     (lagrangian,) = folded([system.lagrangian], Builder())
-    rows = system.mass_matrix(lagrangian)
-    reached = set(topological([entry for row in rows for entry in row]))
+    reached = set(topological(entries(system.mass_matrix(lagrangian))))
     for name, velocity in zip(system.velocities, system.qd, strict=True):
         if velocity in reached:
             raise ValueError(

@@ -186,12 +186,10 @@ def quantity(
     constant: bool = False,
 ) -> Node:
     """function(q, qd, [tau,] t[, p]) or (x, t[, p]) as a node over `quantity_inputs`; constant: or a number."""
-    arguments = state_arguments(problem)
-    if tau is None:
-        node = call_user_function(what, function, *arguments)
-    else:
-        q, qd, *rest = arguments
-        node = call_user_function(what, function, q, qd, list(tau), *rest)
+    arguments = list(state_arguments(problem))
+    if tau is not None:
+        arguments.insert(2, list(tau))
+    node = call_user_function(what, function, *arguments)
     if constant and is_finite(node):
         node = cg.constant(float(node))
     known = _known(problem)

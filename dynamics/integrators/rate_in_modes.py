@@ -92,10 +92,11 @@ class _Reader:
     def __init__(self, problem: Problem, known: Switches | None = None) -> None:
         self.build, self._taken = Builder(), [*problem.rate.input_names]
         self._surfaces: dict[tuple[Node, float], _Surface] = {}
-        self._places, self._known = _Places(), dict[tuple[int, float], Node]()
+        self._shared, self._known = Builder(), dict[tuple[Node, float], Node]()
         if known is not None:
-            of = zip(known.surfaces.outputs.values(), known.spacing, cg.variables(list(known.modes)), strict=True)
-            self._known = {(self._places.of(g), spacing): mode for g, spacing, mode in of}
+            surfaces = folded(list(known.surfaces.outputs.values()), self._shared)
+            of = zip(surfaces, known.spacing, cg.variables(list(known.modes)), strict=True)
+            self._known = {(g, spacing): mode for g, spacing, mode in of}
 
     def read(self, nodes: Sequence[Node]) -> list[Node]:
         """Copies of nodes with modes in place of what switches."""
@@ -174,7 +175,7 @@ class _Reader:
     def _surface(self, g: Node, spacing: float) -> _Surface | None:
         """The surface of a quantity; None of one that is not among those that are known, if some are."""
         if (g, spacing) not in self._surfaces:
-            mode = self._known.get((self._places.of(g), spacing)) if self._known else None
+            mode = self._known.get((folded([g], self._shared)[0], spacing)) if self._known else None
             if mode is None and self._known:
                 return None
             if mode is None:
@@ -201,22 +202,6 @@ def rows_in_modes(problem: Problem, make: Callable[[], Graph], among: frozenset[
     slid = replace(problem, rate=Graph(rate.inputs, outputs))
     nodes = [*(sliding(slid, among) if among else slid).rate.outputs.values()]
     return Graph(rate.inputs, dict(zip(graph.outputs, nodes[problem.size :], strict=True)))
-
-
-class _Places:
-    """Numbers of nodes, the same for those of one structure."""
-
-    def __init__(self) -> None:
-        self._known: dict[tuple[object, ...], int] = {}
-
-    def of(self, node: Node) -> int:
-        """Number of a node."""
-        places: dict[Node, int] = {}
-        for each in topological([node]):
-            leaf = each.name if each.value is None and not each.args else each.value
-            key = (each.op.name, leaf, *[places[arg] for arg in each.args])
-            places[each] = self._known.setdefault(key, len(self._known))
-        return places[node]
 
 
 @kept_by_first

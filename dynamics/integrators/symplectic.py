@@ -58,9 +58,7 @@ class Mechanics(NamedTuple):
 
     momentum: Graph  # (q, qd) -> p
     force: Graph  # (q, qd) -> p_dot = dL/dq + tau + forces - damping qd
-    velocity: (
-        Graph  # (q, qd, p) -> qd, nearer to the velocity that belongs to p: a step of Newton, exact for quadratic K
-    )
+    velocity: Graph  # (q, qd, p) -> qd, nearer to that which belongs to p: a step of Newton, exact for quadratic K
     quadratic: bool  # the momenta are linear in the velocities: M does not depend on them
     separable: bool  # p = M qd with a constant M, and the forces do not depend on the velocities
 

@@ -32,11 +32,6 @@ class Rows(NamedTuple):
     rates: list[Node]  # z
     multipliers: list[Node]  # s
 
-    @classmethod
-    def of(cls, kept: tuple[int, ...], rates: Sequence[Node]) -> Rows:
-        """The kept ones of all rows, with multipliers."""
-        return cls(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
-
     def solve(
         self,
         system: System,
@@ -83,12 +78,14 @@ class Rows(NamedTuple):
         return [*solved[m:], *solved[:m]]
 
 
-def constraint_rows(system: System, rates: Sequence[Node]) -> Rows:
+def constraint_rows(system: System, rates: Sequence[Node], kept: tuple[int, ...] | None = None) -> Rows:
     """The rows that a system is solved with, of all as they are folded; none of a system without constraints.
 
+    kept: some of all rows, in place of the independent ones.
     Raises ConstraintError for constraints that cannot be met together.
     """
-    return Rows.of(independent_rows(system.constraints), rates)
+    kept = independent_rows(system.constraints) if kept is None else kept
+    return Rows(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
 
 
 def leave_no_motion(system: System) -> bool:
@@ -101,13 +98,6 @@ def unknown_names(system: System) -> list[str]:
     """Unknowns of `solve_nodes` in words: velocities, then independent constraints."""
     names = [f"constraint {system.constraints.names[k]!r}" for k in independent_rows(system.constraints)]
     return [*[f"coordinate {name!r}" for name in system.velocities], *names]
-
-
-def require_no_constraints(system: System) -> None:
-    """Raises ValueError for a system with constraints: their multipliers have no place in the balanced order."""
-    if len(system.constraints):
-        name = system.constraints.names[0]
-        raise ValueError(f'method "balanced" needs a system without constraints, got constraint {name!r}')
 
 
 def multiplier_outputs(system: System, rows: Rows, solved: Sequence[Node], build: Builder) -> dict[str, Node]:

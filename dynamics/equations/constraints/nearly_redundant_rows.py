@@ -15,7 +15,7 @@ from cgraph._shared import Array
 
 from ...systems.constraints import Constraints
 from .constraint_rank import DEPENDENT, independent_rows, warn_that_they_follow
-from .row_numbers import RowNumbers, row_numbers
+from .row_numbers import RowNumbers, factors, row_numbers
 
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
 STATES = 6
@@ -40,7 +40,7 @@ def left_without(constraints: Constraints, matrices: Sequence[Array], tolerance:
     """
     names, looped = constraints.names, constraints.loop_rows
     numbers = row_numbers(constraints)
-    scales = [numbers.factors(matrix) for matrix in matrices]
+    scales = [numbers.scale or factors(matrix) for matrix in matrices]
     rest = np.stack(
         [rows[:, None] * matrix * columns for (rows, columns), matrix in zip(scales, matrices, strict=True)]
     )
@@ -70,8 +70,6 @@ def left_without(constraints: Constraints, matrices: Sequence[Array], tolerance:
 
 def left_at(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float], tolerance: float) -> Left:
     """`left_without` at one state."""
-    if not len(constraints):
-        return Left([], np.zeros(0), np.zeros(0))
     numbers = row_numbers(constraints)
     return left_without(constraints, [numbers.matrix(numbers.point(q, {"t": t, **parameters}))], tolerance)
 

@@ -7,7 +7,7 @@ Both are solved by the matrix of the equations of motion, see `constraints`.
 """
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -16,14 +16,15 @@ from cgraph import Graph, Node, extend
 from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Builder, building, folded
 
+from ...systems.arguments import new_variables
 from ...systems.constraints import ConstraintError
-from ...systems.kinematics import ZERO
+from ...systems.kinematics import ZERO, numbered_graph
 from ...systems.system import System
 from ..substitute import substitute
 from .constraint_rank import ConstraintWarning, independent_rows
-from .constraints import Rows
+from .constraints import constraint_rows
 from .nearly_redundant_rows import lost_rank, opened
-from .row_numbers import row_numbers, step_names
+from .row_numbers import row_numbers
 
 ITERATIONS = 20  # of Newton's method
 SPARE = 1.5  # certain digits of a row that is not 0: a start that is off by 30 roundings is moved and said to be
@@ -47,29 +48,25 @@ def projection(system: System) -> Graph | None:
     kept = independent_rows(constraints)
     holonomic = tuple([k for k in kept if k < len(positions)])
     q, u = system.q, system.qd
+
+    def correction(these: tuple[int, ...], gaps: Sequence[Node]) -> list[Node]:
+        """The shortest displacement that takes gaps off these rows."""
+        with building(build):
+            rhs = [*[ZERO] * system.n, *[-gaps[k] for k in these]]
+        rows = constraint_rows(system, rates, these)
+        return rows.solve(system, lagrangian, rhs, build, written=written)[: system.n]
+
     moved = list(q)
     if holonomic:
-        rows = Rows.of(holonomic, rates)
-        shift = _correction(system, lagrangian, rows, [positions[k] for k in holonomic], written, build)
+        shift = correction(holonomic, positions)
         with building(build):
             moved = [x + step for x, step in zip(q, kinematics.rate(shift), strict=True)]
     with building(build):
         moved = kinematics.normalized(moved)
-    rows = Rows.of(kept, rates)
-    change = _correction(system, lagrangian, rows, rows.rates, written, build)
-    change = substitute(change, dict(zip(q, moved, strict=True)))
+    change = substitute(correction(kept, rates), dict(zip(q, moved, strict=True)))
     with building(build):
         velocities = [velocity + step for velocity, step in zip(u, change, strict=True)]
     return cg.simplify(system.graph({f"x{k}": x for k, x in enumerate([*moved, *velocities])}, q, u))
-
-
-def _correction(
-    system: System, lagrangian: Node, rows: Rows, gaps: list[Node], written: Builder, build: Builder
-) -> list[Node]:
-    """The shortest displacement that takes gaps off the rows."""
-    with building(build):
-        rhs = [*[ZERO] * system.n, *[-gap for gap in gaps]]
-    return rows.solve(system, lagrangian, rhs, build, written=written)[: system.n]
 
 
 def projected(system: System, x: Array, t: float, parameters: Mapping[str, float]) -> Array:
@@ -125,13 +122,12 @@ def projected_start(system: System, x: Array, t: float, parameters: Mapping[str,
 def _all_rows(system: System) -> Graph:
     """phi and the rates of all constraints at x + step; inputs x, t if needed, parameters, and the steps."""
     state = [*system.q, *system.qd]
-    steps = cg.variables(step_names(len(state), system.parameters))
+    steps = new_variables("d", len(state), system.parameters)
     positions, rates = system.constraints.positions, system.constraints.rates
-    names = [*[f"phi{k}" for k in range(len(positions))], *[f"rate{k}" for k in range(len(rates))]]
     with building(Builder()):
         moved = {x: x + step for x, step in zip(state, steps, strict=True)}
     rows = substitute([*positions, *rates], moved)
-    return Graph([*state, *system.extra_inputs, *steps], dict(zip(names, rows, strict=True)))
+    return numbered_graph([*state, *system.extra_inputs, *steps], rows)
 
 
 def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Mapping[str, float]) -> list[int]:
@@ -150,10 +146,11 @@ def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Ma
     numbers = row_numbers(system.constraints)
     rows, columns = numbers.scales(numbers.point(x[: system.nq], {"t": t, **parameters}))
     fastest = float(np.abs(x[system.nq :] / columns).max(initial=0.0))
-    for name, value in values.items():
-        k = int(name.removeprefix("phi").removeprefix("rate"))
+    count = len(system.constraints.positions)
+    for i, (name, value) in enumerate(values.items()):
+        k = i if i < count else i - count
         most = SPARE if k in kept else FOLLOWS
-        small = name.startswith("rate") and abs(rows[k] * value) <= NO_RATE * fastest
+        small = i >= count and abs(rows[k] * value) <= NO_RATE * fastest
         if value != 0.0 and not small and not (digits[name] < most and np.isfinite(value)):
             left.add(k)
     return sorted(left)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cgraph as cg
-from cgraph import Graph, _shared, extend
+from cgraph import Graph, Node, _shared, extend
 from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Builder, cotangents
 
+from ...systems.arguments import new_variables
 from ...systems.constraints import ConstraintError, Constraints
-from ...systems.kinematics import ONE
+from ...systems.kinematics import ONE, numbered_graph
 from ..substitute import substitute
 
 SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 3  # of random starts about the neutral coordinates
@@ -43,24 +44,18 @@ class RowNumbers:
         self.n, self.nq = len(kinematics.u), len(kinematics.q)
         build = Builder()
         slopes = [cotangents({rate: ONE}, kinematics.u, build) for rate in constraints.rates]
-        entries = {(k, i): bar for k, row in enumerate(slopes) for i, bar in enumerate(row) if bar.value != 0.0}
-        self.steps = step_names(self.n, constraints.parameters)
-        displaced = dict(zip(kinematics.u, cg.variables(self.steps), strict=True))
+        displaced = dict(zip(kinematics.u, new_variables("d", self.n, constraints.parameters), strict=True))
+        self.steps = [str(node.name) for node in displaced.values()]
         moved = [
             q + dot for q, dot in zip(kinematics.q, kinematics.rate([displaced[u] for u in kinematics.u]), strict=True)
         ]
         self.inputs = [*kinematics.q, constraints.t, *cg.variables(list(constraints.parameters))]
-        numbered = [(f"phi{k}", phi) for k, phi in enumerate(constraints.positions)]
-        self.phi = Graph(self.inputs, dict(numbered)) if numbered else None
-        self.entries = Graph(self.inputs, {f"J{k}_{i}": bar for (k, i), bar in entries.items()}) if entries else None
-        self._places = tuple(np.array(list(entries), dtype=np.intp).reshape(-1, 2).T)
+        self.phi = _graph(self.inputs, constraints.positions)
+        self.entries = _graph(self.inputs, [bar for row in slopes for bar in row])
         normalized = kinematics.normalized(moved)
-        self.moved = Graph([*kinematics.q, *displaced.values()], {f"{i}": node for i, node in enumerate(normalized)})
-        self.landed: Graph | None = None
-        if numbered:
-            there = substitute(list(constraints.positions), dict(zip(kinematics.q, normalized, strict=True)))
-            outputs = {name: phi for (name, _), phi in zip(numbered, there, strict=True)}
-            self.landed = Graph([*self.inputs, *displaced.values()], outputs)
+        self.moved = _graph([*kinematics.q, *displaced.values()], normalized)
+        there = substitute(constraints.positions, dict(zip(kinematics.q, normalized, strict=True)))
+        self.landed = _graph([*self.inputs, *displaced.values()], there)
 
     def states(self) -> Iterator[dict[str, float]]:
         """States that meet the constraints: values of q0.., t and parameters.  See `closings`."""
@@ -145,21 +140,11 @@ class RowNumbers:
 
     def matrix(self, point: Mapping[str, float]) -> Array:
         """J, (m, n)."""
-        return self._filled(() if self.entries is None else _numbers(self.entries, point))
-
-    def _filled(self, entries: Sequence[float]) -> Array:
-        """The matrix of entries that are not the constant 0."""
-        matrix = np.zeros((len(self.constraints), self.n))
-        matrix[self._places] = entries
-        return matrix
+        return _numbers(self.entries, point).reshape(len(self.constraints), self.n)
 
     def certain_matrix(self, point: Mapping[str, float]) -> Array:
         """J with 0 for entries that are rounding alone."""
-        if self.entries is None:
-            return self._filled(())
-        roundoff, outputs = np.finfo(float).eps / 2.0, self.entries.outputs.values()
-        both = _shared.error_bounds(self.entries.nodes, point, roundoff, of_inputs=roundoff)
-        matrix, rounding = (self._filled([float(each[node]) for node in outputs]) for each in both)
+        matrix, rounding = _with_rounding(self.entries, point).reshape(2, len(self.constraints), self.n)
         with np.errstate(invalid="ignore"):
             return np.where(rounding <= UNCERTAIN * np.abs(matrix), matrix, 0.0)
 
@@ -197,10 +182,6 @@ class RowNumbers:
             row = self.constraints.loop_rows.get(name)
             groups.setdefault(f"row {name}" if row is None else f"loop {row.loop}", []).append(k)
         return list(groups.values())
-
-    def factors(self, matrix: Array) -> tuple[Array, Array]:
-        """Factors of rows and columns that make J free of units: those of `scale`, or by its own entries."""
-        return self.scale or factors(matrix)
 
     @cached_property
     def reach(self) -> Array:
@@ -243,16 +224,13 @@ class RowNumbers:
     def about(self, found: Sequence[dict[str, float]], held: Sequence[int]) -> list[dict[str, float]]:
         """States about others where the rows that are held are closed; these themselves where there are none."""
         rng, points = np.random.default_rng(0), list[dict[str, float]]()
-        for point in found:
-            closing = self.closed(self.freely_displaced(point, rng, held), point["t"], point, held=held)
+        for point in found:  # displaced along what these rows leave free
+            _, s, v = np.linalg.svd(self.scaled(point)[list(held)], full_matrices=False)
+            way, v = rng.uniform(-AWAY, AWAY, self.n), v[s > TRUNCATED * s.max(initial=0.0)]
+            q = self.moved_by(point, self.scales(point)[1] * (way - v.T @ (v @ way)))
+            closing = self.closed(q, point["t"], point, held=held)
             points.append(closing.point if closing.worst is None else point)
         return points
-
-    def freely_displaced(self, point: dict[str, float], rng: np.random.Generator, held: Sequence[int]) -> Array:
-        """q of a state displaced at random along what the rows that are held leave free."""
-        _, s, v = np.linalg.svd(self.scaled(point)[list(held)], full_matrices=False)
-        way, v = rng.uniform(-AWAY, AWAY, self.n), v[s > TRUNCATED * s.max(initial=0.0)]
-        return self.moved_by(point, self.scales(point)[1] * (way - v.T @ (v @ way)))
 
     def scales(self, point: dict[str, float]) -> tuple[Array, Array]:
         """Factors of rows and columns by what J is about a state; a displacement of 1 turns rows."""
@@ -279,7 +257,7 @@ class RowNumbers:
 
     def gaps(self, point: Mapping[str, float]) -> Array:
         """phi."""
-        return np.zeros(0) if self.phi is None else np.array(_numbers(self.phi, point))
+        return _numbers(self.phi, point)
 
     def flat(self, point: dict[str, float], matrix: Array) -> NDArray[np.bool_]:
         """Rows of phi that a displacement opens by far more than their slopes say, (m,), as of a square that is met.
@@ -287,11 +265,7 @@ class RowNumbers:
         Of the shortest displacement that opens the row by far more than its rounding.  matrix: J at the state.
         """
         flat = np.zeros(len(self.constraints), dtype=bool)
-        if self.phi is None:
-            return flat
-        roundoff, outputs = np.finfo(float).eps / 2.0, self.phi.outputs.values()
-        values, bounds = _shared.error_bounds(self.phi.nodes, point, roundoff, of_inputs=roundoff)
-        closed = np.array([abs(float(values[node])) + float(bounds[node]) for node in outputs])
+        closed = np.abs(_with_rounding(self.phi, point)).sum(axis=0)
         left, way = np.arange(len(closed)), self.scales(point)[1] * np.random.default_rng(0).uniform(-1.0, 1.0, self.n)
         for size in SIZES:
             there = np.abs(self.gaps(self.point(self.moved_by(point, size * way), point)))
@@ -315,15 +289,28 @@ class RowNumbers:
 
     def moved_by(self, point: Mapping[str, float], step: Array) -> Array:
         """q after a step along the velocities, (nq,)."""
-        return np.array(_numbers(self.moved, {**point, **dict(zip(self.steps, step.tolist(), strict=True))}))
+        return _numbers(self.moved, {**point, **dict(zip(self.steps, step.tolist(), strict=True))})
 
 
 row_numbers = kept_by_first(RowNumbers)
 
 
-def _numbers(graph: Graph, point: Mapping[str, float]) -> tuple[float, ...]:
+def _graph(inputs: Sequence[Node], nodes: Sequence[Node]) -> Graph | None:
+    return numbered_graph(inputs, nodes) if nodes else None
+
+
+def _numbers(graph: Graph | None, point: Mapping[str, float]) -> Array:
     """The outputs at a point, {input: number}, by generated Python: hundreds of points follow one another."""
-    return in_python(graph).values([point[name] for name in graph.input_names])
+    return np.array([] if graph is None else in_python(graph).values([point[name] for name in graph.input_names]))
+
+
+def _with_rounding(graph: Graph | None, point: Mapping[str, float]) -> Array:
+    """The outputs at a point, and bounds of their rounding, (2, k)."""
+    if graph is None:
+        return np.zeros((2, 0))
+    roundoff, outputs = np.finfo(float).eps / 2.0, graph.outputs.values()
+    both = _shared.error_bounds(graph.nodes, point, roundoff, of_inputs=roundoff)
+    return np.array([[float(each[node]) for node in outputs] for each in both])
 
 
 @kept_by_first
@@ -338,24 +325,6 @@ class Closing(NamedTuple):
     point: dict[str, float]
     size: float  # of what is left, in the unit of displacements
     worst: int | None  # the row that is furthest from 0; None where all are 0
-
-
-def step_names(count: int, taken: Iterable[str]) -> list[str]:
-    """Names of steps, none of which is that of a parameter."""
-    stem = "d"
-    while any([name.startswith(stem) for name in taken]):
-        stem += "'"
-    return [f"{stem}{i}" for i in range(count)]
-
-
-def balance(matrix: Array) -> tuple[Array, Array]:
-    """Factors of rows and columns that make them alike, and free of units (Ruiz)."""
-    rows, columns = (np.ones(count) for count in matrix.shape)
-    for _ in range(4):
-        for axis, factors in ((0, columns), (1, rows)):
-            size = np.abs(rows[:, None] * matrix * columns).max(axis=axis, initial=0.0)
-            factors /= np.sqrt(np.where(size > 0.0, size, 1.0))
-    return rows, columns
 
 
 def factors(matrix: Array) -> tuple[Array, Array]:
@@ -377,9 +346,3 @@ def alike(matrix: Array) -> tuple[Array, Array]:
     system[np.arange(len(row)), row] = system[np.arange(len(row)), m + column] = 1.0
     found = np.exp(-np.linalg.lstsq(system, np.log(matrix[row, column]), rcond=None)[0]) if len(row) else np.ones(m + n)
     return found[:m], found[m:]
-
-
-def equilibrated(matrix: Array) -> Array:
-    """The matrix with rows and columns scaled to be alike, whatever their units."""
-    rows, columns = balance(matrix)
-    return rows[:, None] * matrix * columns

@@ -32,20 +32,18 @@ class Blame(NamedTuple):
     cancelled: tuple[str, ...] = ()
 
 
-class Split(NamedTuple):
-    """A graph by a formulation in which all that comes through the step is multiplied by the input `through`."""
+def split(system: System, formulation: str, derive: Derive) -> tuple[Graph, Node]:
+    """Torques or momenta by a formulation of `THROUGH_STEP`, and an input by which all that comes by it is multiplied.
 
-    graph: Graph
-    through: Node
-
-
-def split(system: System, formulation: str, derive: Derive) -> Split:
-    """The torques or momenta of a formulation of `THROUGH_STEP`: at 1 they are its own, at 0 those without the step."""
+    At 1 they are its own, at 0 those without the step.
+    """
     (through,) = new_variables("through", 1, system.parameters)
-    return Split(cg.simplify(derive(system, formulation, through)), through)
+    return cg.simplify(derive(system, formulation, through)), through
 
 
-def blame(system: System, formulation: str, derive: Derive, graph: Graph, known: Split | None = None) -> Blame:
+def blame(
+    system: System, formulation: str, derive: Derive, graph: Graph, known: tuple[Graph, Node] | None = None
+) -> Blame:
     """Blame for what the graph has by the derivative through the step, whether its value is 0 or not.
 
     derive: `torques` or `momenta`, of which `graph` is the simplified graph by this formulation.  known: its `split`.

@@ -143,7 +143,9 @@ def torques(system: System, formulation: str = "chain_rule", through: Node = ONE
     through: a factor of what `THROUGH_STEP` lets through q = qd dt + q_old; an input of the graph if it is a variable.
     """
     terms = _lagrange_terms(system, formulation, through)
-    applied = _forces(system, terms)
+    applied: Sequence[Node] = system.forces
+    if terms.q is not system.q:  # at the embedded state
+        applied = substitute(applied, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
     build = Builder()
     braking = system.braking(build, terms.qd)
     outputs = {}
@@ -169,13 +171,6 @@ def _lagrange_terms(system: System, formulation: str, through: Node = ONE) -> La
     if through is not ONE:
         return _embedded(system, THROUGH_STEP[formulation](system), through)
     return FORMULATIONS[formulation_name(formulation)](system)
-
-
-def _forces(system: System, terms: LagrangeTerms) -> list[Node]:
-    """The system's forces at the state of the terms: itself, or the embedded one."""
-    if terms.q is system.q:
-        return list(system.forces)
-    return substitute(system.forces, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
 
 
 class Embedding:

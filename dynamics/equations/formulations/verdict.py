@@ -7,12 +7,13 @@ is 0 at every state.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from cgraph import Edge, Graph, Node, _shared, extend, simplify
+from cgraph import Edge, Graph, Node, _shared, extend, jacobian, simplify
 from cgraph._shared import Remarks, counted, remarked, require_mapping, shortened
 from cgraph.extend import Builder, Names, building, cotangents, folded
 
@@ -20,9 +21,8 @@ from ...systems.kinematics import ONE
 from ...systems.model import Model, as_system, display_names
 from ...systems.system import System
 from ..equation import documented
-from .blame import Derive, Split, blame, split
+from .blame import Derive, blame, split
 from .lagrange_terms import THROUGH_STEP, formulation_name, torques
-from .off import Off, off_at
 from .verdict_state import STATES, asked_state, chosen_state, numbers_of
 
 if TYPE_CHECKING:
@@ -57,6 +57,40 @@ class Excess(NamedTuple):
     def __str__(self) -> str:
         number = f"{self.value:.6g}"
         return " = ".join(dict.fromkeys(filter(None, (self.symbol, self.formula, number))))
+
+
+class Off(NamedTuple):
+    """How many torques are off, and how many of their slopes d tau / d(q, qd), at a state at which something is.
+
+    torques, slopes: of these many `of_torques`, n, and `of_slopes`, n (nq + n).
+
+    >>> import dynamics as dyn
+    >>> print(dyn.formulation_verdict(dyn.scenes.load("triple_pendulum"), "by_definition").off)
+    Off are 3 of 3 torques and 15 of 18 slopes d tau/d(q, qd).
+    """
+
+    torques: int
+    of_torques: int
+    slopes: int
+    of_slopes: int
+
+    def __str__(self) -> str:
+        slopes = f"{self.slopes} of {self.of_slopes} slopes d tau/d(q, qd)"
+        return f"Off are {self.torques} of {counted(self.of_torques, 'torque')} and {slopes}."
+
+
+def off_at(graph: Graph, terms: Graph | None, at: Mapping[str, float], torques: int) -> Off:
+    """The count at a state.  graph: the torques.  terms: what each is off by.  torques: how many are off."""
+    found = [re.fullmatch(r"(qd?\d+)(?:_old)?", name) for name in graph.input_names]
+    state = [each[1] for each in found if each]  # coordinates and velocities, after the step
+    of_torques = sum([name.startswith("tau") for name in graph.outputs])
+    if terms is None or not torques:
+        return Off(0, of_torques, 0, of_torques * len(state))
+    slopes = jacobian(terms, wrt=[name for name in state if name in terms.input_names])
+    known = {name: at.get(name, 1.0) for name in slopes.input_names}  # of what no torque uses any number
+    digits, values = extend.certain_digits(slopes, known), slopes.evaluate(known)
+    wrong = [name for name, value in values.items() if value and digits[name] >= 1.0]
+    return Off(torques, of_torques, len(wrong), of_torques * len(state))
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,7 +349,7 @@ def formulation_verdict(
     values = {name: there.get(name, 0.0) for name in terms.outputs if name in found or name in there}
     marked = split(system, formulation, torques)
     faults = blame(system, formulation, torques, graph, marked)
-    wrong, right = (_torques(marked, state, through) for through in (1.0, 0.0))
+    wrong, right = (_torques(*marked, state, factor) for factor in (1.0, 0.0))
     called = Names(terms, names)
 
     def term(name: str, sign: int) -> Excess:
@@ -364,9 +398,9 @@ def _step(slope: str) -> str:
     return f"q = {'G ' * slope.startswith('G')}qd dt + q_old"
 
 
-def _torques(marked: Split, at: Mapping[str, float], through: float) -> dict[str, float]:
+def _torques(graph: Graph, through: Node, at: Mapping[str, float], factor: float) -> dict[str, float]:
     """The torques as dt tends to 0, with what comes through the step times a factor; what rounding alone made is 0."""
-    graph, given = marked.graph, {"dt": 0.0, str(marked.through.name): through}
+    given = {"dt": 0.0, str(through.name): factor}
     known = {name: given[name] if name in given else at[name.removesuffix("_old")] for name in graph.input_names}
     digits, values = extend.certain_digits(graph, known), graph.evaluate(known)
     return {name: float(value) if digits[name] >= 1.0 else 0.0 for name, value in values.items()}

@@ -15,7 +15,6 @@ from ...systems.constraints import ConstraintError
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraint_rank import DEPENDENT, independent_rows
-from ..constraints.row_numbers import equilibrated
 from ..equation import documented
 from ..states.evaluate import evaluate
 from ..states.initial_value import parameter_values, start_state
@@ -142,7 +141,10 @@ def _slopes(
 
 def _following(system: System, kept: tuple[int, ...], matrix: Array) -> list[int]:
     """Velocities that follow from the others, one for each row in turn, by the largest entry of J, (m, n)."""
-    left, chosen = equilibrated(matrix), list[int]()
+    left, chosen = matrix, list[int]()
+    for axis in (0, 1) * 4:  # entries are made alike, and free of units (Ruiz)
+        size = np.abs(left).max(axis=axis, keepdims=True, initial=0.0)
+        left = left / np.sqrt(np.where(size > 0.0, size, 1.0))
     for k, row in enumerate(left):
         pivot = int(np.abs(row).argmax())
         if not np.abs(row[pivot]) > DEPENDENT:

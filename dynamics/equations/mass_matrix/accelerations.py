@@ -89,19 +89,15 @@ def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
         limit = worth if graph is graphs[-1] else 1.0
         if _cost(graph.nodes) >= limit * _cost(chosen.nodes):
             continue
-        regimes = _regimes(system, graphs[0])
+        moving = _sizes(system, graphs[0])
+        torques = {f"tau{i}": LITTLE * moving.get(f"tau{i}", 1.0) for i in range(system.n)}
+        # in motion, and at rest with little torque, where weight counts if any
+        regimes = moving, moving | {f"qd{i}": 0.0 for i in range(system.n)} | torques
         limits = limits or [GROWTH * rounding_spread(graphs[0], system.parameters, sizes) for sizes in regimes]
         pairs = zip(regimes, limits, strict=True)
         if all(rounding_spread(graph, system.parameters, sizes) <= most for sizes, most in pairs):
             chosen = graph
     return chosen
-
-
-def _regimes(system: System, accelerations: Graph) -> list[dict[str, float]]:
-    """Sizes of samples and of outputs: in motion, and at rest with little torque, where weight counts if any."""
-    moving = _sizes(system, accelerations)
-    torques = {f"tau{i}": LITTLE * moving.get(f"tau{i}", 1.0) for i in range(system.n)}
-    return [moving, moving | {f"qd{i}": 0.0 for i in range(system.n)} | torques]
 
 
 def _sizes(system: System, accelerations: Graph) -> dict[str, float]:

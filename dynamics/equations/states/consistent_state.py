@@ -12,7 +12,6 @@ from cgraph._shared import Array
 
 from ...systems.arguments import finite_time
 from ...systems.model import Model, as_system
-from ...systems.system import System
 from ..constraints.constraint_rank import ConstraintWarning
 from ..constraints.projection import projected
 from ..equation import documented
@@ -63,8 +62,8 @@ def consistent_state(
     ([0.6, 0.8], [0.64, -0.48])
     """
     system = as_system(model)
-    start, state = _projected(system, q, qd, t, parameters)
-    before, velocity = start[system.nq :], state[system.nq :]
+    before = given_state(system, q, qd)[system.nq :]
+    place, velocity = nearest_state(system, q, qd, t, parameters)
     lengths = np.array([length or 1.0 for length in system.lengths[system.nq :]])  # 0 is no known length
     change = lengths * np.abs(velocity - before)
     sizes = lengths * np.maximum(np.abs(before), np.abs(velocity))
@@ -72,7 +71,7 @@ def consistent_state(
         k = int(change.argmax())
         text = f"velocity {system.velocities[k]!r} from {before[k]:.3g} to {velocity[k]:.3g}"
         warnings.warn(f"{MOVED}, the most {text}", ConstraintWarning, stacklevel=2)
-    return state[: system.nq], velocity
+    return place, velocity
 
 
 def nearest_state(
@@ -80,13 +79,5 @@ def nearest_state(
 ) -> tuple[Array, Array]:
     """`consistent_state` of velocities that nobody chose, such as random ones: without a warning."""
     system = as_system(model)
-    _, state = _projected(system, q, qd, t, parameters)
+    state = projected(system, given_state(system, q, qd), finite_time(t), parameter_values(system, parameters))
     return state[: system.nq], state[system.nq :]
-
-
-def _projected(
-    system: System, q: ArrayLike, qd: ArrayLike, t: float, parameters: Mapping[str, float] | None
-) -> tuple[Array, Array]:
-    """The state as it is given, (nq + n,), and moved onto the constraints."""
-    time, start = finite_time(t), given_state(system, q, qd)
-    return start, projected(system, start, time, parameter_values(system, parameters))

@@ -130,17 +130,14 @@ def input_rows(
 def _arrays(system: System, state: State) -> tuple[dict[str, Array], tuple[int, ...]]:
     """The parts of a state, checked, (n,) or (N, n) each, and () or (N,)."""
     arrays = {name: _rows(system, name, state.get(name)) for name in STATE}
-    shapes = {(), *[rows.shape[:-1] for rows in arrays.values()]}
-    if len(shapes) <= 2:
-        return arrays, max(shapes)  # () and (N,)
     shape: tuple[int, ...] = ()
     for name, rows in arrays.items():
-        try:
-            shape = np.broadcast_shapes(shape, rows.shape[:-1])
-        except ValueError:
-            raise ValueError(
-                f"the arrays of a state must have as many rows, or one, got {len(rows)} of {name} after {shape[0]}"
-            ) from None
+        many = rows.shape[:-1]
+        if shape in ((), (1,)):
+            shape = many or shape
+        elif many not in ((), (1,), shape):
+            text = f"got {len(rows)} of {name} after {shape[0]}"
+            raise ValueError(f"the arrays of a state must have as many rows, or one, {text}")
     return arrays, shape
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -125,7 +125,10 @@ class TorqueTable:
 
     def to_text(self, digits: int = 4) -> str:
         """The table in columns of text, with the sum tau; without a state, expressions or their sizes."""
-        return _aligned(self._cells(digits), "  ")
+        rows = self._cells(digits)
+        first, *widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = [[head.ljust(first), *map(str.rjust, cells, widths)] for head, *cells in rows]
+        return "".join([f"{'  '.join(line).rstrip()}\n" for line in lines])
 
     def __str__(self) -> str:
         return self.to_text().rstrip("\n")
@@ -149,9 +152,14 @@ class TorqueTable:
 
     def _cells(self, digits: int) -> list[list[str]]:
         require_whole("digits", digits, 1)
-        cells = self._expressions() if self.values is None else self._numbers(digits)
-        rows = [[name, *row] for name, row in zip(self.rows, cells, strict=True)]
-        head = ["", *self.columns]
+        head, width = ["", *self.columns], len(self.columns)
+        if self.values is None:
+            names, called = Names(self.graph), display_names(self.system)
+            cells = [self._expression(names, called, node) for node in self.graph.outputs.values()]
+        else:
+            pairs = zip(self.zeros.flat, self.values.flat, strict=True)
+            cells = [STRUCTURAL_ZERO if zero else f"{value:.{digits}g}" for zero, value in pairs]
+        rows = [[name, *cells[i * width : (i + 1) * width]] for i, name in enumerate(self.rows)]
         if self.values is not None:
             sums = [f"{torque:.{digits}g}" for torque in self.total]
             if self.sum_axis == 0:
@@ -161,19 +169,6 @@ class TorqueTable:
                 rows = [[*row, total] for row, total in zip(rows, sums, strict=True)]
         return [head, *rows]
 
-    def _numbers(self, digits: int) -> list[list[str]]:
-        assert self.values is not None
-        return [
-            [STRUCTURAL_ZERO if zero else f"{value:.{digits}g}" for zero, value in zip(*row, strict=True)]
-            for row in zip(self.zeros, self.values, strict=True)
-        ]
-
-    def _expressions(self) -> list[list[str]]:
-        names, called = Names(self.graph), display_names(self.system)
-        cells = [self._expression(names, called, node) for node in self.graph.outputs.values()]
-        width = len(self.columns)
-        return [cells[i * width : (i + 1) * width] for i in range(len(self.rows))]
-
     def _expression(self, names: Names, called: Mapping[str, str], node: Node) -> str:
         """A cell written out, coordinates by name, or the number of its operations where that would be too long."""
         if node.value == 0.0:
@@ -182,17 +177,6 @@ class TorqueTable:
         if "%" in text:  # it refers to a line of the listing
             return f"{len([part for part in topological([node]) if part.args])} operations"
         return re.sub(r"\b(q|qd|qdd)\d+\b", lambda match: called[match[0]], text)
-
-
-def _aligned(rows: Sequence[Sequence[str]], gap: str) -> str:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = [
-        gap.join(
-            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
-        )
-        for row in rows
-    ]
-    return "".join(f"{line.rstrip()}\n" for line in lines)
 
 
 def _latex(cell: str) -> str:

@@ -17,7 +17,7 @@ from cgraph.extend import Builder, topological
 
 from ...equations.state_equation import FORMS, StateInputs, state_inputs
 from ...equations.states.initial_value import initial_values
-from ...integrators import Problem, derive, in_form, quantity
+from ...integrators import Problem, derive, in_form, quantity, quantity_inputs
 from ...integrators.rate_in_modes import switched
 from ...systems.arguments import TIME, Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
@@ -405,17 +405,13 @@ def _loss_graph(problem: Problem, what: str, loss: Loss | None, tau: Sequence[No
     if loss is None:
         return None
     node = quantity(problem, what, loss, tau, constant=True)
-    order = topological([node])
-    places = {each: k for k, each in enumerate(order)}
-    leaves = [each.name if each.value is None else float(each.value).hex() for each in order]  # 0.0 and -0.0 apart
-    key = [(each.op.name, leaf, *[places[arg] for arg in each.args]) for each, leaf in zip(order, leaves, strict=True)]
-    if not (kept := _place(problem, tuple(key))):
+    if not (kept := _place(problem, cg.structure_hash(Graph(quantity_inputs(problem), {"loss": node})))):
         kept.append(problem.observed({"loss": node}))
     return kept[0]
 
 
 @memo(LOSSES_KEPT)
-def _place(problem: Problem, key: tuple[object, ...]) -> list[Graph]:
+def _place(problem: Problem, key: str) -> list[Graph]:
     """Place for the graph of a loss of these operations."""
     return []
 

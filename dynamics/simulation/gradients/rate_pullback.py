@@ -20,6 +20,7 @@ from ...equations.mass_matrix.accelerations import DENSE_UP_TO
 from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.arguments import new_variables
+from ...systems.kinematics import numbered_graph
 from ...systems.system import System
 
 ARITHMETIC = ("add", "sub", "mul", "neg")
@@ -51,8 +52,7 @@ class RatePullback:
         known = dict(zip(copies[count:], self.shared.values(), strict=True))
         known |= dict(zip(self.mu, substitute(copies[1 : 1 + n], known), strict=True))
         pulled = substitute(cotangents(seeds, wrt, build), known)
-        outputs = {f"{k}": node for k, node in enumerate(pulled)}
-        return cg.simplify(Graph([*self.inputs, *self.values, *self.shared.values(), *self.bars], outputs))
+        return cg.simplify(numbered_graph([*self.inputs, *self.values, *self.shared.values(), *self.bars], pulled))
 
 
 def rate_pullback(problem: Problem) -> RatePullback | None:
@@ -72,7 +72,7 @@ def rate_pullback(problem: Problem) -> RatePullback | None:
     names = [*problem.states, *[str(node.name) for node in more]]
 
     def bound(nodes: Sequence[Node]) -> list[Node]:
-        return [*problem.bind(names, Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})).outputs.values()]
+        return [*problem.bind(names, numbered_graph(inputs, nodes)).outputs.values()]
 
     power, *q_dot = bound([power, *system.q_dot])
     solved = min([bound(way) for way in ways], key=lambda nodes: _unshared_count(problem.rate, nodes))

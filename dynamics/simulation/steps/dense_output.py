@@ -34,10 +34,7 @@ class StepBlock(NamedTuple):
     @property
     def nbytes(self) -> int:
         """Bytes of the numbers."""
-        return sum(array.nbytes for array in self._arrays().values())
-
-    def _arrays(self) -> dict[str, Array]:
-        return {name: value for name, value in self._asdict().items() if isinstance(value, np.ndarray)}
+        return sum(each.nbytes for each in self if isinstance(each, np.ndarray))
 
     def states_at(self, rows: Indices, s: Array) -> Array:
         """States (k, m) at the shares s (k,) of the steps `rows` (k,)."""
@@ -95,8 +92,7 @@ class StepBlock(NamedTuple):
 
     def part(self, which: slice) -> StepBlock:
         """Subset of the steps."""
-        arrays = {name: array[which] for name, array in self._arrays().items()}
-        return self._replace(**arrays)  # type: ignore[arg-type]
+        return StepBlock._make([each[which] if isinstance(each, np.ndarray) else each for each in self])
 
     def ending(self, t: float, x: Array) -> StepBlock:
         """The steps, the last of which ends at an instant inside it."""

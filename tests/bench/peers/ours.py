@@ -12,8 +12,7 @@ import cgraph as cg
 from cgraph import Compiled, Graph, Node
 from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Call, Program, runner
-from dynamics.equations.linearization.linearization import LinearRows, linear_rows
-from dynamics.equations.linearization.linearize_many import linearize_many
+from dynamics.equations.linearization.linearization import LinearRows, linear_rows, linearize_many
 from dynamics.equations.state_equation import state_equation
 from dynamics.multibody.bodies.body import Body
 from dynamics.multibody.trees.mechanism import Mechanism, as_mechanism

@@ -11,7 +11,7 @@ import numpy as np
 import cgraph as cg
 from cgraph._shared import Array
 from dynamics.equations.equations_of_motion import bias, forward_dynamics, mass_matrix
-from dynamics.equations.linearization.linearize_many import linearize_many
+from dynamics.equations.linearization.linearization import linearize_many
 from dynamics.experiments.timing import Made, spent
 from dynamics.multibody.builders.planar_arm import planar_arm
 from dynamics.multibody.trees.mechanism import Mechanism

@@ -50,9 +50,9 @@ def _start(inertia: Sequence[float], omega: Sequence[float]) -> tuple[float, ...
     return 0.0, tilt, angle, precession, tilting, omega[2] - precession * math.cos(tilt)
 
 
-def _total(q: Sequence[cg.Node], qd: Sequence[cg.Node]) -> cg.Node:
-    """The square of the angular momentum of the free body."""
-    x, y, z = ((moment * omega) ** 2 for moment, omega in zip(INERTIA, spin(q, qd), strict=True))
+def _total(w: Sequence[cg.Node]) -> cg.Node:
+    """The square of the angular momentum of the free body at an angular velocity."""
+    x, y, z = ((moment * omega) ** 2 for moment, omega in zip(INERTIA, w, strict=True))
     return x + y + z
 
 
@@ -82,7 +82,7 @@ def euler_equations(growth: float) -> StabilityCase:
         growth=growth,
         invariants=conserved_states(
             energy=lambda w: 0.5 * (INERTIA[0] * w[0] ** 2 + INERTIA[1] * w[1] ** 2 + INERTIA[2] * w[2] ** 2),
-            momentum=lambda w: (INERTIA[0] * w[0]) ** 2 + (INERTIA[1] * w[1]) ** 2 + (INERTIA[2] * w[2]) ** 2,
+            momentum=_total,
         ),
     )
 
@@ -100,7 +100,7 @@ def middle_axis(growth: float) -> StabilityCase:
         criteria=(energy_criterion(1.0), Criterion("momentum", SLACK * RTOL, "no torque", 4.0)),
         size=(100.0, 1.0, 10.0, 1.0, 1.0, 1.0),
         growth=growth,
-        invariants=conserved(momentum=_total),
+        invariants=conserved(momentum=lambda q, qd: _total(spin(q, qd))),
     )
 
 
