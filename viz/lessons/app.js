@@ -70,7 +70,6 @@ function explain(link) {
     tag("b", {}, `${document.getElementById(id).textContent}: `), document.getElementById(id).nextElementSibling.textContent));
 }
 
-const NAV = document.querySelector("nav");
 const LINKS = SCREENS.map((screen, i) => {
   const text = i === 0 ? "Start" : i === SCREENS.length - 1 ? "End" : String(i);
   const link = tag("a", { href: `#${i}`, "aria-label": `${text}: ${screen.querySelector("h2").textContent}` }, text);
@@ -95,7 +94,7 @@ AGAIN.addEventListener("click", () => {
   ASKING.forEach((screen) => { screen.querySelector(".reveal").open = false; });
   go(0);
 });
-NAV.append(...LINKS, SCORE, AGAIN);
+document.querySelector("nav").append(...LINKS, SCORE, AGAIN);
 document.body.classList.add("stepped");
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("input")) return;

@@ -22,11 +22,6 @@ function typedRecord(text, forward = false) {
     return { wrong: TYPED.explained(text, error) };
   }
 }
-/** What a page that has nothing else shows first. */
-function firstTyped(text) {
-  return (typedRecord(linkedText() ?? text).record ?? typedRecord(text).record);
-}
-
 /** The box at work. text: what it holds at first, where the address has none.  shown: whether the page shows that. */
 function startTyped(inspector, text, shownFirst) {
   const before = inspector.record(), box = byId("text"), opener = openingButton();

@@ -4,12 +4,6 @@ const FRAMES = 150, WORK = 2e7, OVERHEAD = 60; // instants; operations at most, 
 const AWAY = 0.5; // where coordinates start that would rest, as nobody said where
 const TOLERANCE = 1e-6, UNSURE = 1e-2; // relative change by halving the step that is little enough, and too much to be shown
 
-/** Values of nodes for Map {name of a variable: number}. */
-function valuesOf(nodes, at) {
-  const inputs = topological(nodes).filter(({ op }) => op === "variable");
-  return compiled(inputs, nodes)(inputs.map(({ name }) => at.get(name)));
-}
-
 /** A function from numbers of the inputs, in order, to numbers of some nodes. */
 function compiled(inputs, nodes) {
   const order = topological(nodes), { number, ...graph } = numbered(order, inputs), evaluated = evaluator(graph);

@@ -122,11 +122,11 @@ class Meaning {
   }
   /** The number of a formula that may have parameters, and nothing that moves. */
   number({ items: [steps], at, end, name }) {
-    const node = asNode(this.formula(steps));
-    if (topological([node]).some((inner) => [...this.q, ...this.qd, this.t].includes(inner))) {
+    const node = asNode(this.formula(steps)), inputs = topological([node]).filter(({ op }) => op === "variable");
+    if (inputs.some((input) => [...this.q, ...this.qd, this.t].includes(input))) {
       throw new TextError(`${quoted(name)} is set to a number here, and coordinates, velocities and t have none.`, at, end);
     }
-    const [value] = valuesOf([node], this.parameters);
+    const [value] = compiled(inputs, [node])(inputs.map((input) => this.parameters.get(input.name)));
     if (!Number.isFinite(value)) throw new TextError(`${quoted(name)} has no finite value.`, at, end);
     return value;
   }

@@ -73,7 +73,8 @@ def typed_page(text: str | None = None) -> Page:
     if text is not None and not isinstance(text, str):
         raise TypeError(f"a Lagrangian is typed as text, got {type(text).__name__}: {text!r:.60}")
     held = 'TYPED.EXAMPLES.get("double pendulum")' if text is None else _literal(text)
-    return compose("Your own Lagrangian", None, (), [_panel(f"firstTyped({held})", f"{held}, true", "")])
+    first = f"typedRecord(linkedText() ?? {held}).record ?? typedRecord({held}).record"
+    return compose("Your own Lagrangian", None, (), [_panel(first, f"{held}, true", "")])
 
 
 def box(text: str = "") -> Panel:
