@@ -299,8 +299,7 @@ class _Checks:
     def _sum(self, equation: str, table: TorqueTable) -> Residual:
         cells = self.value(table.graph).reshape(-1, len(table.rows), len(table.columns))
         axis = 1 + table.sum_axis
-        tau = self.value(self.inverse)
-        return rounded(equation, cells.sum(axis=axis) - tau, np.abs(cells).sum(axis=axis))
+        return rounded(equation, cells.sum(axis=axis) - self.value(self.inverse), np.abs(cells).sum(axis=axis))
 
     def _adjoint(self) -> Residual:
         """u . (J v) by forward mode and (J^T u) . v by reverse mode, J = d tau / d(q, qd, qdd)."""
