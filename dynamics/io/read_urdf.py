@@ -335,10 +335,11 @@ def _balls(links: Mapping[str, Element]) -> tuple[list[Ball], list[str]]:
             center, turn = origin_of(collision, where)
             half = 0.5 * _numbers(shape, where, "length", 1)[0] if shape.tag == "capsule" else 0.0
             radius = _numbers(shape, where, "radius", 1)[0]
-            if not (radius > 0.0 and half >= 0.0):
-                raise MechanismError(f"{where}: radius must be positive, and length not negative")
+            if not (radius >= 0.0 and half >= 0.0):
+                raise MechanismError(f"{where}: radius and length must not be negative")
             centers = capsule_ends(center, turn[:, 2], half) if half else [center]
-            balls += [Ball(name, at, radius) for at in centers]
+            balls += [Ball(name, at, radius) for at in centers if radius]
+            others += [f"{name}: {shape.tag} of radius 0"] * (not radius)
     sentences = {
         f"contacts of shapes other than spheres and capsules ({listed(others)})": others,
         "contacts of links with one another": len(touching) > 1,
