@@ -16,6 +16,7 @@ COMPLIANT = "compliant"
 Material: TypeAlias = str | Mapping[str, float | str]  # "compliant", or quantities of `Contact` beside it
 SINK = 0.01  # of r: how far a sphere sinks that carries the weight of the whole model; of two, 1/r = 1/r_1 + 1/r_2
 CREEP = 0.1  # of sqrt(g sink): the transition velocity of friction
+OF_WEIGHT = ("stiffness", "dissipation", "velocity")  # what follows from the weight where it is not given
 FRICTION = 1.0  # where the file says nothing, as in MuJoCo
 
 
@@ -55,7 +56,7 @@ def with_contacts(
 
     material: see `asked`; a name is a parameter of the number that all contacts have.  left_out: sentences on contacts
     that are not among them.
-    Raises MechanismError where nothing has weight, and for a parameter in place of different numbers.
+    Raises MechanismError for numbers of a weight that is not there, and a parameter in place of different numbers.
     """
     balls = [ball for ball in balls if mechanism.carriers[ball.body].name != WORLD]
     said = (*left_out, *present({"contacts, as there are none of spheres or capsules of bodies that move": not balls}))
@@ -64,9 +65,10 @@ def with_contacts(
         return mechanism
     gravity = float(np.linalg.norm(np.asarray(mechanism.gravity, dtype=np.float64)))
     weight = gravity * sum([float(body.mass) for body in mechanism.moving])
-    if not weight:
-        raise MechanismError("the stiffness of contacts follows from the weight of the model, and it has none")
-    contacts = [_of_material(ball, weight, gravity) for ball in balls]
+    following = [what for what in OF_WEIGHT if isinstance(material.get(what, ""), str)]
+    if following and not weight:
+        raise MechanismError(f"contacts of a model without weight need numbers for {', '.join(following)}")
+    contacts = [_of_material(ball, weight, gravity or 1.0) for ball in balls]
     parameters = dict(mechanism.parameters)
     for what, name in material.items():
         if isinstance(name, str):

@@ -1,7 +1,7 @@
 """Elements of a file that a mechanism has not: refused, or left out and said; and loops that follow from others."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from cgraph._shared import require_flag
 
@@ -19,6 +19,11 @@ def listed(names: Sequence[str]) -> str:
     """All of the names, or the first few of many, each on one line."""
     shown = [name if name.isprintable() else repr(name) for name in names[:5]]
     return ", ".join([*shown, *([f"{len(names) - 5} more"] if len(names) > 5 else [])])
+
+
+def unused(name: str, names: Collection[str]) -> str:
+    """The name, or with as many apostrophes as make it one that is not among the names."""
+    return name if name not in names else unused(f"{name}'", names)
 
 
 def follows_itself(name: str, leaders: Mapping[str, str]) -> bool:

@@ -17,7 +17,7 @@ from .contacts import Material, standing
 from .left_out import warned
 from .mujoco_module import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
-from .read_urdf import add_floating_base, origin_of, read_urdf
+from .read_urdf import add_floating_base, armatures, origin_of, read_urdf
 from .smooth_forces import Smooth, smooth
 from .source import called, is_text, require_root, root_of, urdf_root
 
@@ -182,14 +182,19 @@ def load_at_start(source: Source, ignore: bool, floating: bool, taken: Smooth) -
 
 
 def compiled(source: Source, *, floating: bool = False) -> MjModel:
-    """MuJoCo's own model, an MjModel, of a model, MJCF or URDF, read as `load_at_start` does.
+    """MuJoCo's own model, an MjModel, of a model, MJCF or URDF, read as `load_at_start` does, with its `armatures`.
 
     Raises MechanismError for what MuJoCo cannot read, and for joints with other coordinates there; and ImportError.
     """
     if isinstance(source, mujoco().MjModel):
         return source
-    text = _for_mujoco(urdf_root(source), floating) if root_of(source) == "robot" else source
-    return compiled_mjcf(text, called(source))
+    if root_of(source) != "robot":
+        return compiled_mjcf(source, called(source))
+    robot = urdf_root(source)
+    mj = compiled_mjcf(_for_mujoco(robot, floating), called(source))
+    for name, armature in armatures(robot).items():
+        mj.joint(name).armature = armature
+    return mj
 
 
 def _for_mujoco(robot: ElementTree.Element, floating: bool) -> str:

@@ -104,8 +104,7 @@ def _coupling(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Loop:
     starts = mj.tendon_length0 if _kind(mj, i) == "tendon" else mj.qpos0[mj.jnt_qposadr]
     body = _coupled(mj, i, one, moving)
     if other < 0:
-        held = float(mj.eq_data[i, 0] + starts[one])
-        return Loop("coupling", body, coefficients=[held], name=name)
+        return Loop("coupling", body, coefficients=[float(mj.eq_data[i, 0] + starts[one])], name=name)
     shifted = Polynomial(mj.eq_data[i, :5])(Polynomial([-starts[other], 1.0])) + float(starts[one])
     coefficients = [float(x) for x in np.trim_zeros(shifted.coef, "b")]
     return Loop("coupling", body, _coupled(mj, i, other, moving), coefficients=coefficients or [0.0], name=name)

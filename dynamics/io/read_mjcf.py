@@ -20,7 +20,7 @@ from ..multibody.bodies.joint_coordinates import coordinate_names, velocity_name
 from ..multibody.joints import TYPES
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
 from .contacts import untaken, with_contacts
-from .left_out import listed, present, refused_or_left_out
+from .left_out import listed, present, refused_or_left_out, unused
 from .mjcf_contacts import mjcf_balls
 from .mujoco_module import mujoco, word_of
 from .read_equality import left_of_equalities, other_equalities, read_loops
@@ -117,12 +117,8 @@ def _body_names(mj: MjModel) -> list[str]:
     """Names of MuJoCo's bodies; one without gets one that no other has."""
     names = [mj.body(i).name for i in range(mj.nbody)]
     for i, name in enumerate(names):
-        names[i] = name or _unused(f"body {i}", names)
+        names[i] = name or unused(f"body {i}", names)
     return names
-
-
-def _unused(name: str, names: Sequence[str]) -> str:
-    return name if name not in names else _unused(name + "'", names)
 
 
 def _chain(
@@ -141,10 +137,10 @@ def _chain(
     for j in joints:
         called = name
         if j != joints[-1]:
-            called = _unused(f"{name} {labels[j] or f'joint {j}'}", names)
+            called = unused(f"{name} {labels[j] or f'joint {j}'}", names)
             names.append(called)
         anchor = mj.jnt_pos[j] if TYPES[_kind(mj, j)].turns else np.zeros(3)
-        label = labels[j] or _unused(called, labels)
+        label = labels[j] or unused(called, labels)
         link = replace(_joint(mj, j, position + orientation @ anchor, orientation), name=label * (label != called))
         chain.append(Body(called, link, parent))
         parent, position, orientation = called, -anchor, np.eye(3)

@@ -20,7 +20,7 @@ from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from .contacts import FRICTION, capsule_ends, untaken, with_contacts
-from .left_out import follows_itself, listed, present, refused_or_left_out
+from .left_out import follows_itself, listed, present, refused_or_left_out, unused
 from .recorded_element import XACRO, Recorded, unread
 from .smooth_forces import Smooth
 
@@ -47,7 +47,7 @@ def read_urdf(robot: Recorded, called: str, ignore: bool, floating: bool, smooth
         leaders, refused = read_mimics(joints)
         read = {name: _limits(joint, name) for name, joint in joints.items()}
         limits, impossible = {name: each for name, (each, _) in read.items()}, [name for name in read if read[name][1]]
-        rotors = _armatures(robot, joints, limits)
+        rotors = armatures(robot)
         with np.errstate(all="ignore"):  # of numbers that are not finite Mechanism says where they stand
             inertials = {name: _inertial(link, name) for name, link in links.items()}
             bodies = [] if root == WORLD else [Body(root, Joint("fixed"), **inertials[root][0])]
@@ -80,16 +80,12 @@ def add_floating_base(robot: Element) -> None:
     A root link that is called as the world itself gets a name that no link has.
     """
     joints, links = _by_name(robot, "joint"), _by_name(robot, "link")
-    root = name = _root(links, joints)
-    while name in links and root == WORLD:
-        name += "'"
-    if root == WORLD:
-        ends = [end for joint in joints.values() for end in joint.findall("parent") if end.get("link") == WORLD]
-        for element, attribute in ((links[root], "name"), *[(end, "link") for end in ends]):
-            element.set(attribute, name)
-        root = name
-    while name in joints:
-        name += "'"
+    given = _root(links, joints)
+    root = unused(given, links) if given == WORLD else given
+    ends = [end for joint in joints.values() for end in joint.findall("parent") if end.get("link") == given]
+    for element, attribute in ((links[given], "name"), *[(end, "link") for end in ends]):
+        element.set(attribute, root)
+    name = unused(root, joints)
     joint = Recorded("joint", {"name": name, "type": "floating"})
     joint.extend([Recorded("parent", {"link": WORLD}), Recorded("child", {"link": root})])
     robot.extend([Recorded("link", {"name": WORLD}), joint])
@@ -184,17 +180,17 @@ def _first_in_plane(axis: Sequence[float]) -> Array:
     return np.array([1.0 - share * x * x, -share * x * y, -x])
 
 
-def _armatures(robot: Element, joints: Mapping[str, Element], limits: Mapping[str, Limits]) -> dict[str, float]:
+def armatures(robot: Element) -> dict[str, float]:
     """{joint: gear^2 times the inertia of the rotors that drive it [kg m^2 or kg]}, by the extension of Drake's.
 
     As there, of simple transmissions, on joints of one coordinate whose limit of effort is not 0.
     """
-    found: dict[str, float] = {}
+    found, joints = dict[str, float](), _by_name(robot, "joint")
     for transmission in robot.iter("transmission"):
         kind, where = transmission.findtext("type", transmission.attrib.get("type", "")), "a <transmission>"
         names = [end.get("name", "") for end in transmission.iter("joint") if "SimpleTransmission" in kind]
         for name in [each for each in names[:1] if each in joints and joints[each].get("type") in _SINGLE]:
-            for actuator in transmission.iter("actuator") if limits[name].effort[1] > 0.0 else ():
+            for actuator in transmission.iter("actuator") if _limits(joints[name], name)[0].effort[1] > 0.0 else ():
                 rotor, gear = (_one(actuator, where, f"drake:{what}") for what in ("rotor_inertia", "gear_ratio"))
                 if rotor is not None:
                     transmission.get("name")
@@ -253,8 +249,7 @@ def origin_of(element: Element, where: str) -> tuple[Array, Array]:
 def from_rpy(roll: float, pitch: float, yaw: float) -> Array:
     """The rotation by angles [rad] about the fixed x, then y, then z."""
     x, y, z = np.eye(3)
-    turns = spatial.rotation(z, yaw), spatial.rotation(y, pitch), spatial.rotation(x, roll)
-    return spatial.snapped(turns[0] @ turns[1] @ turns[2])
+    return spatial.snapped(spatial.rotation(z, yaw) @ spatial.rotation(y, pitch) @ spatial.rotation(x, roll))
 
 
 def _one(element: Element, where: str, tag: str) -> Element | None:
@@ -335,8 +330,8 @@ def _balls(links: Mapping[str, Element], gravity: Sequence[float]) -> tuple[list
             center, turn = origin_of(collision, where)
             half = 0.5 * _numbers(shape, where, "length", 1)[0] if shape.tag == "capsule" else 0.0
             radius = _numbers(shape, where, "radius", 1)[0]
-            if not (radius > 0.0 and half >= 0.0):
-                raise MechanismError(f"{where}: radius must be positive, and length not negative")
+            if not (radius >= 0.0 and half >= 0.0):
+                raise MechanismError(f"{where}: radius and length must not be negative")
             centers = capsule_ends(center, turn[:, 2], half) if half else [center]
             balls += [Contact(name, at=at, radius=radius, **ground) for at in centers]
     sentences = {

@@ -242,11 +242,9 @@ def _range(mj: MjModel, what: str, i: int) -> Range | None:
 
 def joint_limits(mj: MjModel, j: int) -> Limits:
     """Limits of a hinge or slide of MuJoCo's model as numbers: its range, and what its actuators can do together."""
-    driving = [i for i in range(actuators(mj)) if _on_joint(mj, i) and mj.actuator_trnid[i, 0] == j]
-    efforts = [_effort(mj, i) for i in driving]
+    efforts = [_effort(mj, i) for i in range(actuators(mj)) if _on_joint(mj, i) and mj.actuator_trnid[i, 0] == j]
     total = (sum([low for low, _ in efforts]), sum([high for _, high in efforts])) if efforts else ANYTHING
-    effort = _clipped(total, _range(mj, "jnt_actfrc", j))
-    return Limits(_range(mj, "jnt_", j) or ANYTHING, effort=effort)
+    return Limits(_range(mj, "jnt_", j) or ANYTHING, effort=_clipped(total, _range(mj, "jnt_actfrc", j)))
 
 
 def _effort(mj: MjModel, i: int) -> Range:

@@ -41,6 +41,7 @@ STEP = 1e-3  # of differences, in units of the coordinates
 FORWARD = {0: -25.0, 1: 48.0, 2: -36.0, 3: 16.0, 4: -3.0}  # 12 times the weights of values a step apart
 # On a state's own side of a kink or jump, such as a joint limit, differences are those of a smooth function.
 STENCILS = ({-2: 1.0, -1: -8.0, 1: 8.0, 2: -1.0}, FORWARD, {-k: -weight for k, weight in FORWARD.items()})
+OFF_KINKS = 8.0  # steps, beyond a stencil, away from states that constraints hold at the very kink of a limit
 MOST_STATES = 1_000_000  # of a certificate, some of whose matrices are kept for all states
 
 
@@ -300,8 +301,7 @@ class _Checks:
     def _sum(self, equation: str, table: TorqueTable) -> Residual:
         cells = self.value(table.graph).reshape(-1, len(table.rows), len(table.columns))
         axis = 1 + table.sum_axis
-        tau = self.value(self.inverse)
-        return rounded(equation, cells.sum(axis=axis) - tau, np.abs(cells).sum(axis=axis))
+        return rounded(equation, cells.sum(axis=axis) - self.value(self.inverse), np.abs(cells).sum(axis=axis))
 
     def _adjoint(self) -> Residual:
         """u . (J v) by forward mode and (J^T u) . v by reverse mode, J = d tau / d(q, qd, qdd)."""
@@ -312,26 +312,24 @@ class _Checks:
         given, taken = ([cg.constant(float(each)) for each in numbers] for numbers in (v, u))
         dots = changes(dict(zip(state, given, strict=True)), torques)
         bars = cotangents(gathered(zip(torques, taken, strict=True)), state, Builder())
-        pushed, pulled = (
-            self.value(self.graph({str(i): node for i, node in enumerate(nodes)})) for nodes in (dots, bars)
-        )
+        pushed, pulled = (self.value(self.graph({str(i): x for i, x in enumerate(nodes)})) for nodes in (dots, bars))
         terms = np.abs(pushed * u).sum(axis=-1) + np.abs(pulled * v).sum(axis=-1)
         return rounded("AD: u . (J v) = (J^T u) . v for tau", (pushed @ u - pulled @ v)[:, None], terms[:, None])
 
     def _differences(self, equation: str, graph: Graph) -> Residual:
         """Catches what no comparison of derivatives with derivatives can: a rule of differentiation that is wrong."""
         system = self.system
-        names = ("q", "qd", "qdd")
         sizes = {"q": system.nq, "qd": system.n, "qdd": system.n}
-        line = {name: self.rng.normal(size=sizes[name]) for name in names}
-        given = [cg.constant(float(each)) for name in names for each in line[name]]
+        line = {name: self.rng.normal(size=size) for name, size in sizes.items()}
+        given = [cg.constant(float(each)) for part in line.values() for each in part]
         dots = changes(dict(zip([*system.q, *system.qd, *system.qdd], given, strict=True)), graph.outputs.values())
-        slope = self.value(self.graph(dict(zip(graph.outputs, dots, strict=True))))
 
-        moved = {
-            k / 2: self.value(graph, **{name: self.at[name] + 0.5 * k * STEP * line[name] for name in names})
-            for k in range(-8, 9)
-        }
+        def near(steps: float) -> dict[str, Array]:
+            far = STEP * (steps + OFF_KINKS * self.held.any)
+            return {name: self.at[name] + far * part for name, part in line.items()}
+
+        moved = {k / 2: self.value(graph, **near(k / 2)) for k in range(-8, 9)}
+        slope = self.value(self.graph(dict(zip(graph.outputs, dots, strict=True))), **near(0.0))
 
         def differences(stencil: Mapping[int, float], step: float) -> Array:
             total: Array = np.sum([weight * moved[k * step] for k, weight in stencil.items()], axis=0)

@@ -1,6 +1,7 @@
 """Contacts of robot files: which shapes meet, where, of what material; and what is left out."""
 
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -128,10 +129,7 @@ def test_a_sphere_that_carries_all_sinks_by_a_hundredth_of_its_radius() -> None:
 def test_what_is_no_sphere_on_a_plane_is_left_out_and_said() -> None:
     mujoco = pytest.importorskip("mujoco")
     mj = mujoco.MjModel.from_xml_string(CROWD.format(flags=""))
-    with pytest.warns(
-        dyn.MechanismWarning, match="left out contacts other than of spheres, and of capsules with planes"
-    ):
-        model = dyn.load_mjcf(mj, contacts="compliant")
+    model = silently(dyn.load_mjcf, mj, contacts="compliant")
     found = [each for each in model.forces if isinstance(each, dyn.Contact)]
     friction = {each.body: each.friction for each in found if each.to_radius is None}
     assert friction == {"a": 0.7, "b": 0.25, "c": 0.1, "d": 1.0, "e": 1.0}
@@ -170,9 +168,8 @@ def test_numbers_of_contacts_are_given_or_named() -> None:
     given = {"stiffness": 3e4, "friction": "mu", "dissipation": 0.5}
     model = silently(dyn.load_urdf, text, contacts=given)
     assert model.parameters == {"mu": 1.0}
-    for own, one in zip(usual.forces, model.forces, strict=True):
-        assert isinstance(own, dyn.Contact)
-        assert isinstance(one, dyn.Contact)
+    pairs: Any = zip(usual.forces, model.forces, strict=True)
+    for own, one in pairs:
         assert {name: getattr(one, name) for name in given} == given
         assert (one.velocity, one.radius) == (own.velocity, own.radius)
     same = silently(dyn.load_urdf, text.replace("0.02", "0.05"), contacts={"stiffness": "k", "friction": "mu"})
@@ -193,14 +190,17 @@ def test_where_nothing_touches_or_weighs_it_is_said() -> None:
     text = "contacts, as there are none of spheres or capsules of bodies that move"
     with pytest.warns(dyn.MechanismWarning, match=text):
         assert text in dyn.load_urdf(rotor, contacts="compliant").left_out
-    light = LEG.format(shape='<sphere radius="0.05"/>').replace(
-        "</robot>", '<mujoco><option gravity="0 0 0"/></mujoco></robot>'
-    )
-    with raises(
-        dyn.MechanismError, match="stiffness of contacts follows from the weight of the model, and it has none"
-    ):
-        dyn.load_urdf(light, contacts="compliant")
+    point = silently(dyn.load_urdf, LEG.format(shape='<sphere radius="0"/>'), contacts="compliant")
+    assert "contacts of shapes other than spheres and capsules (leg: sphere of radius 0)" in point.left_out
     with raises(ValueError, match="contacts must be"):
         dyn.load_urdf(rotor, contacts="rigid")
-    with raises(dyn.MechanismError, match="collision of link 'leg': radius must be positive"):
+    with raises(dyn.MechanismError, match="collision of link 'leg': radius and length must not be negative"):
         dyn.load_urdf(LEG.format(shape='<sphere radius="-1"/>'), contacts="compliant")
+    pytest.importorskip("mujoco")
+    numbers: dict[str, float | str] = {"dissipation": 1.0, "velocity": 0.01, "stiffness": 1e4}
+    light, heavy = (CROWD.format(flags=flags) for flags in ('<flag gravity="disable"/>', ""))
+    floats, falls = (silently(dyn.load_mjcf, text, contacts=numbers) for text in (light, heavy))
+    weightless = replace(falls, gravity=(0.0, 0.0, 0.0))
+    assert dyn.inverse_dynamics(floats).listing() == dyn.inverse_dynamics(weightless).listing()
+    with raises(dyn.MechanismError, match="of a model without weight need numbers for stiffness"):
+        dyn.load_mjcf(light, contacts=numbers | {"stiffness": "k"})
