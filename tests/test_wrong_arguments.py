@@ -317,7 +317,6 @@ CALLS = {
     "dyn.Reference.deviation": call(EXACT.deviation, [[0.0, 1.0], [0.0, 1.0]]),
     "dyn.Reference.relative_error": call(EXACT.relative_error, [[0.0, 1.0], [0.0, 1.0]]),
     "dyn.Subtree.with_parent": call(SUBTREE.with_parent, "world"),
-    "dyn.System.braking": call(SYSTEM.braking, extend.Builder()),
     "dyn.System.mass_matrix": call(SYSTEM.mass_matrix, SYSTEM.lagrangian, None),
     "dyn.System.graph": call(SYSTEM.graph, {"o": SYSTEM.q[0]}, SYSTEM.q),
     "dyn.Verdict.excess_at": call(dyn.formulation_verdict(SYSTEM).excess_at, {"q0": 0.0, "qd0": 0.0}),
@@ -405,7 +404,6 @@ CALLS |= {
     **{f"extend.Names.{name}": call(getattr(NAMES, name), X) for name in ("called", "formula", "line", "short")},
     **{f"extend.Names.{name}": call(getattr(NAMES, name), "x") for name in ("meant", "shown")},
     "extend.Names.text": call(NAMES.text, X, 32),
-    "extend.Names.inputs_of": call(NAMES.inputs_of, "at", {"x": 1.0, "y": 2.0}),
     **{f"extend.Names.{name}": call(getattr(NAMES, name), "x", "a node") for name in ("all", "one", "output")},
     "extend.Program": call(extend.Program, {"x": 1}, [HALF], ["x"], record_if="x", stop="x", feed=["x"]),
     "extend.Program.listing": call(PROGRAM.listing, {"halve": HALVE}),
@@ -493,7 +491,8 @@ RECORDS = """
 # Nothing to give; types; decorators; what a mechanism calls; what empties the user's caches; the fast way into compiled
 # code, which looks at nothing, and into the names of nodes; what needs a package that need not be there, see
 # `tests/cgraph/bridges`.
-LEFT_OUT = """dyn.System.changed dyn.System.require_known dyn.System.require_values
+LEFT_OUT = """dyn.System.braking extend.Names.inputs_of
+    dyn.System.changed dyn.System.require_known dyn.System.require_values
     extend.require_length dyn.JointForce.check dyn.JointForce.along dyn.JointLimit.along
     dyn.JointLimit.check dyn.JointSpring.along dyn.JointSpring.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check cg.as_jax cg.to_casadi cg.to_jax

@@ -333,7 +333,8 @@ def _balls(links: Mapping[str, Element], gravity: Sequence[float]) -> tuple[list
             if not (radius >= 0.0 and half >= 0.0):
                 raise MechanismError(f"{where}: radius and length must not be negative")
             centers = capsule_ends(center, turn[:, 2], half) if half else [center]
-            balls += [Contact(name, at=at, radius=radius, **ground) for at in centers]
+            balls += [Contact(name, at=at, radius=radius, **ground) for at in centers if radius]
+            others += [f"{name}: {shape.tag} of radius 0"] * (not radius)
     sentences = {
         f"contacts of shapes other than spheres and capsules ({listed(others)})": others,
         "contacts of links with one another": len(touching) > 1,

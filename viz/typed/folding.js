@@ -18,7 +18,7 @@ function foldAdd(a, b) {
   if (a.value !== null) return a.value === 0 ? b : offset(a.value, b, 1);
   if (b.op === "neg") return sub(a, b.args[0]);
   if (a.op === "neg") return sub(b, a.args[0]);
-  return a === b ? mul(2, a) : null;
+  return a === b ? mul(2, a) : doubled("add", a, b);
 }
 function foldSub(a, b) {
   if (a.value === 0) return neg(b);
@@ -27,8 +27,10 @@ function foldSub(a, b) {
   if (joined) return joined;
   if (a === b) return constant(0);
   if (b.op === "neg") return add(a, b.args[0]);
-  return a.op === "neg" ? neg(add(a.args[0], b)) : null;
+  return a.op === "neg" ? neg(add(a.args[0], b)) : doubled("sub", a, b);
 }
+/** 2 * x + 2 * y or their difference with the factor taken out. */
+const doubled = (op, ...terms) => (terms.every((term) => term.op === "mul" && term.args[0].value === 2) ? mul(2, apply(op, ...terms.map((term) => term.args[1]))) : null);
 function foldMul(a, b) {
   if (b.value !== null) [a, b] = [b, a];
   if (a.value !== null) return timesConstant(a.value, b);
@@ -70,7 +72,6 @@ function foldDiv(a, b) {
 }
 function foldNeg(a) {
   if (a.op === "neg") return a.args[0];
-  if (a.op === "sub") return sub(a.args[1], a.args[0]);
   return a.op === "mul" && a.args[0].value !== null ? mul(constant(-a.args[0].value), a.args[1]) : null;
 }
 function foldZeroSafe(a, b) {

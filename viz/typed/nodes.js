@@ -65,6 +65,8 @@ class Builder {
       const value = VALUE[op](...args.map((arg) => arg.value));
       if (!Number.isNaN(value)) return constant(value);
     } else {
+      const [{ op: inner, args: [a, b] }] = args; // of a difference that was made here the sign is turned round
+      if (op === "neg" && inner === "sub" && this.made.get(`sub ${a.id} ${b.id}`) === args[0]) return this.make("sub", [b, a], label);
       const simpler = FOLD[op]?.(...args);
       if (simpler) return simpler;
     }

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph._shared import HoldsNodes, kept_by_first
+from cgraph._shared import HoldsNodes, kept_by_first, require_mapping
 
 from ..bodies.body import (
     BODY_QUANTITIES,
@@ -117,7 +117,10 @@ class Structure(HoldsNodes, ABC):
     @property
     def standing(self) -> dict[str, float | ArrayLike]:
         """Coordinates of joints that are locked, and of those that couplings hold to them."""
-        standing = {body_name(self.bodies, name, "to lock "): at for name, at in self.locked.items()}
+        locked = require_mapping("locked", self.locked, "body: coordinate")
+        if not all([isinstance(name, str) for name in locked]):
+            raise MechanismError(f"locked names bodies by strings, got {[*locked]!r:.60}")
+        standing = {body_name(self.bodies, name, "to lock "): at for name, at in locked.items()}
         for _ in self.loops:
             for loop in self.loops:
                 standing |= coupled(loop, standing)
@@ -186,6 +189,8 @@ class Structure(HoldsNodes, ABC):
         Mechanism does, also for a loop of the subtree with a body that is not there.
         """
         given = as_subtree(subtree)
+        if not isinstance(to, str | None):
+            raise MechanismError(f"to must be a body's name, got {type(to).__name__}: {to!r:.60}")
         if to not in (None, WORLD) and any(to in (each.name, each.joint.name) for each in self.bodies):
             to = body_name(self.bodies, to)
         for name, value in given.parameters.items():

@@ -111,7 +111,7 @@ def _tolerance(kinds: StateKinds) -> tuple[Statement, ...]:
         return known
     lowest = each(lambda floor, rounded: {"floor": cg.maximum(floor, rounded)})  # of the longest of looks ahead
     raised = each(lambda tolerance, floor: {"tolerance": cg.maximum(tolerance, floor)})
-    return (*known, lowest, raised)
+    return (*known, Call(kinds.floor, ("reach",), ("rounded",)), lowest, raised)
 
 
 def _at_rest(kinds: StateKinds) -> list[Statement]:
