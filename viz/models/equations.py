@@ -10,6 +10,7 @@ from cgraph import Graph, Node, variable
 from cgraph._shared import Side, counted, ink, is_letter, reading_form
 from cgraph.extend import Builder, cotangents
 from dynamics.equations.constraints.constraints import Rows, constraint_rows
+from dynamics.equations.formulations.lagrange_terms import Embedding
 from dynamics.scenes import Scene
 from dynamics.systems.kinematics import ONE, ZERO
 
@@ -169,6 +170,8 @@ def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
     chain_rule, title = formulation == "chain_rule", f"Torque, {formulation.replace('_', ' ')}"
     if rows.kept:
         pulls = cotangents(dict(zip(rows.rates, rows.multipliers, strict=True)), system.qd)
+        if "q0_old" in graph.input_names:
+            pulls = Embedding(system).embed(*pulls)
         torques = {name: tau - pull for (name, tau), pull in zip(graph.outputs.items(), pulls, strict=True)}
         graph = cg.simplify(Graph([*graph.inputs, *rows.multipliers], torques))
     explicit = _statements(graph)

@@ -255,6 +255,16 @@ def by_matrices(said, scene, kept, point):
         assert rows @ qdd == pytest.approx(np.ravel(said[letter["r"]]), rel=CLOSE, abs=CLOSE)
 
 
+@each_row("formulation", dyn.FORMULATIONS)
+def test_the_torque_of_every_formulation_has_the_forces_of_constraints(formulation):
+    rod = dyn.System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - q[1], "x y",
+        constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0},
+    )  # fmt: skip
+    text = equations_text(model_equations(dyn.scenes.of_model(rod), formulation=formulation), ALL_DIGITS)
+    assert "tau.x = qdd.x - 2 * q.x * lambda.rod" in text
+
+
 @each_row("model", ["spring_mass", "cart_pole", "hoop", "arm of 3", "relativistic"])
 def test_the_spurious_term_is_what_the_formulations_differ_by_as_dt_tends_to_0(model):
     """Against the graphs themselves at a small step, to the order of the step."""
