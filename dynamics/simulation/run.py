@@ -431,7 +431,8 @@ def _sides(modes: Modes) -> Sides:
             kept.pop()
         if not kept or turn.modes != kept[-1].modes:
             kept.append(turn)
-    sides, spacing = np.array([turn.modes for turn in kept]), modes.plain.switches.spacing  # type: ignore[union-attr]
+    spacing = modes.plain.switches.spacing  # type: ignore[union-attr]
+    sides = np.array([turn.modes for turn in kept]).reshape(-1, len(spacing))
     return Sides(modes.words, np.array([turn.t for turn in kept]), sides, (sides - 1.0) / spacing % 1.0 != 0.0)
 
 

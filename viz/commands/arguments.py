@@ -53,7 +53,10 @@ def reads_files(command: argparse.ArgumentParser) -> None:
         "--limits", type=_spring, metavar="K,D", help="take limits of joints as springs of this stiffness and damping"
     )
     command.add_argument(
-        "--friction", type=positive, metavar="V", help="take friction loss, most of which acts from this velocity on"
+        "--friction",
+        type=from_zero,
+        metavar="V",
+        help="take friction loss, most of which acts from this velocity on; 0: it sticks",
     )
     command.add_argument("--actuators", action="store_true", help="take motors and servos of MJCF, with inputs at 0")
     command.add_argument(
@@ -206,6 +209,11 @@ def positive(text: str) -> float:
     if value <= 0.0:
         raise argparse.ArgumentTypeError(f"expected a positive number, got {text!r}")
     return value
+
+
+def from_zero(text: str) -> float:
+    """A number of at least 0, for argparse."""
+    return 0.0 if number(text) == 0.0 else positive(text)
 
 
 def may_draw_and_print(command: argparse.ArgumentParser) -> None:
