@@ -155,7 +155,7 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
     gaps = within.max(axis=0) / (1.0 if numbers.scale is None else numbers.scale[0])
     for rows, what in (
         (dropped, "left out; a smaller tolerance of the Loop keeps {}"),
-        (close, "kept: {} may hold the motion"),
+        (close, "kept: what is small may hold the motion"),
     ):
         listed = [
             f"{names[k]!r} ({shares[k]:.1e} of it is new, open by up to {gaps[k]:.1e}{_unit(constraints, k)})"

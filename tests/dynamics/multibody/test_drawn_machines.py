@@ -126,10 +126,11 @@ def test_planar_loops_in_oblique_axes_of_7_digits_close_to_7_digits(machine: Cal
 
 @pytest.mark.parametrize("count", [10, *slow(20, 40)])
 def test_rows_that_open_are_kept_in_a_row_of_windows(count: int) -> None:
-    """As drawn they lie flat, where half of the rows say nothing."""
+    """As drawn they lie flat, where half of the rows say nothing; of 40, two are doubted, and kept."""
     model, q, qd = windows(count)
-    with warnings.catch_warnings(action="error", category=dyn.ConstraintWarning):
+    with warnings.catch_warnings(record=True, action="always", category=dyn.ConstraintWarning) as noted:
         run = dyn.simulate(model, -np.array(q), qd, 1.0)
+    assert [each for each in noted if "left out" in str(each.message)] == []
     numbers = row_numbers(model.system.constraints)
     assert run.success
     assert max(np.abs(numbers.gaps(numbers.point(row, {"t": 0.0}))).max() for row in run.q) < 1e-12

@@ -71,7 +71,7 @@ def test_what_is_left_out_and_what_is_kept_is_said_and_can_be_chosen() -> None:
     assert len(dyn.forward_dynamics(model).outputs) == 6
     given = one_tilted("point", 1e-6)
     stiff = replace(given, loops=[replace(given.loops[0], tolerance=0.0)])
-    with pytest.warns(dyn.ConstraintWarning, match="is kept: it may hold the motion"):
+    with pytest.warns(dyn.ConstraintWarning, match="is kept: what is small may hold the motion"):
         assert stiff.system.constraints.whole is None
     with pytest.raises(dyn.ConstraintError, match=r"where 'coupler to rocker y' is 0; it is \S+e-0[89] at the nearest"):
         dyn.consistent_state(stiff, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
