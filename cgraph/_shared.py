@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from .simplification.reading_form import reading_form as reading_form
     from .simplification.rounding_growth import (
         error_bounds as error_bounds,
-        output_bounds as output_bounds,
+        rounding_noise as rounding_noise,
         rounding_spread as rounding_spread,
     )
     from .util.atomic_write import (

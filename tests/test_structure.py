@@ -49,7 +49,7 @@ LAZY = {
 }
 MOST_LAZY = 10
 LINES = {  # at most; whoever makes room writes the lower number, and nobody a higher one
-    "packages": 62_733,
+    "packages": 62_731,
     "tests": 40_962,
     "bench": 4_474,
     "pages": 5_296,

@@ -124,18 +124,32 @@ def rounding_spread(graph: Graph, values: Mapping[str, float], sizes: Mapping[st
         name: known_sizes.get(name, 1.0) * np.tile(rng.normal(size=_POINTS), 2) for name in graph.input_names
     }
     samples |= values
-    known: dict[Node, Value] = {}
     with np.errstate(all="ignore"):
-        for k, node in enumerate(topological(list(graph.outputs.values()))):
-            if node.args:
-                value = node.op.array(*[known[arg] for arg in node.args])
-                known[node] = value * factors[k % _SIGNS] if columns(node.op).rounding else value
-            else:
-                known[node] = samples[node.name or ""] if node.value is None else node.value
-        found = np.array(
-            [np.broadcast_to(known[node], 2 * _POINTS) / known_sizes.get(k, 1.0) for k, node in graph.outputs.items()]
-        )
+        found = _with_errors(graph, samples, factors)
+        found /= np.array([[known_sizes.get(name, 1.0)] for name in graph.outputs])
         exact, moved = found[:, :_POINTS], found[:, _POINTS:]
         spread = np.abs(moved - exact).max(axis=0) / np.abs(exact).max(axis=0)
     usable = spread[np.isfinite(spread)]
     return float(usable.mean()) / ERROR_UNIT if len(usable) else np.inf
+
+
+def rounding_noise(graph: Graph, values: Mapping[str, float], count: int = 16) -> tuple[Array, Array]:
+    """Outputs at a point, and how far roundings, each either way at random, move them at most in so many trials."""
+    factors = 1.0 + ERROR_UNIT * np.random.default_rng(0).choice([-1.0, 1.0], size=(_SIGNS, 1 + count))
+    factors[:, 0] = 1.0
+    with np.errstate(all="ignore"):
+        found = _with_errors(graph, values, factors)
+        exact = found[:, 0]
+        return exact, np.abs(found - exact[:, None]).max(axis=1) * (2.0**-53 / ERROR_UNIT)
+
+
+def _with_errors(graph: Graph, inputs: Mapping[str, Value], factors: Array) -> Array:
+    """Outputs, (outputs, columns), where results of operations that round are times these factors, in turn."""
+    known: dict[Node, Value] = {}
+    for k, node in enumerate(topological(list(graph.outputs.values()))):
+        if node.args:
+            value = node.op.array(*[known[arg] for arg in node.args])
+            known[node] = value * factors[k % _SIGNS] if columns(node.op).rounding else value
+        else:
+            known[node] = inputs[node.name or ""] if node.value is None else node.value
+    return np.array([np.broadcast_to(known[node], factors.shape[1]) for node in graph.outputs.values()], dtype=float)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from typing import Any
@@ -11,8 +11,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array, error_bounds, output_bounds
-from cgraph.extend import topological
+from cgraph._shared import Array, rounding_noise
 
 from ...equations.state_equation import state_inputs
 from ...integrators import Problem
@@ -22,7 +21,7 @@ from .row_values import values_of
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 OTHERS = 1e-4  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
-MOVES = 10.0  # bounds of rounding: a rate beyond them is none of it alone
+MOVES = 10.0  # times what rounding does to a rate: one beyond is not rounding alone
 ROUNDING_SIZE = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 
 
@@ -110,17 +109,14 @@ def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
     point = dict.fromkeys(problem.rate.input_names, 0.0)
     point |= {name: float(known[name]) for name in problem.parameters if name in known}
     point |= dict(zip(problem.states, problem.system.kinematics.neutral, strict=False))
-    rates, pushed = _rounded(problem.rate, point, error_bounds)
-    rests = np.abs(rates) <= MOVES * pushed
-    if not (np.isfinite(pushed).all() and rests[nq:].any()):  # that much tell wider bounds, which cost less
+    rates, pushed = rounding_noise(problem.rate, point)
+    rests = np.isfinite(pushed) & (np.abs(rates) <= MOVES * pushed) & (np.arange(problem.size) >= nq)
+    pushed = np.where(rests, pushed, 0.0)
+    if not pushed.any():
         return kinds
-    pushed = _rounded(problem.rate, point, output_bounds)[1]
-    pushed[(np.abs(rates) > MOVES * pushed) | (np.arange(problem.size) < nq)] = 0.0
     at_once = np.zeros(problem.size)
     if problem.projection is not None:
-        at_once = np.nan_to_num(_rounded(problem.projection, point, output_bounds)[1], posinf=0.0)
-    if not (pushed.any() or at_once.any()):
-        return kinds
+        at_once = np.nan_to_num(rounding_noise(problem.projection, point)[1], posinf=0.0)
     pushed, at_once = (values_of(kinds.largest, each) for each in (pushed, at_once))  # one passes it on to another
     turned = np.zeros(problem.size)  # coordinates by the velocities that move them
     for k, those in enumerate(kinds.moved):
@@ -129,18 +125,6 @@ def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
     [time] = cg.variables("time")
     rows = zip(at_once.tolist(), pushed.tolist(), turned.tolist(), strict=True)
     return replace(kinds, floor=cg.simplify(numbered_graph([time], [a + time * (b + time * c) for a, b, c in rows])))
-
-
-def _rounded(graph: Graph, point: Mapping[str, float], bounds: Callable[..., Any]) -> tuple[Array, Array]:
-    """The outputs at a point, and bounds of their rounding errors, by `error_bounds` or `output_bounds`."""
-    outputs, roundoff = list(graph.outputs.values()), 2.0**-53
-    nodes, inputs = topological(outputs), {name: np.array([point[name]]) for name in graph.input_names}
-    if bounds is output_bounds:
-        found, errors = output_bounds(nodes, outputs, inputs, roundoff, 0.0, float)
-        return np.array([np.ravel(found[node])[0] for node in outputs]), errors[:, 0]
-    found, wide = error_bounds(nodes, inputs, roundoff)
-    values, errors = (np.array([np.ravel(each[node])[0] for node in outputs]) for each in (found, wide))
-    return values, errors
 
 
 def off_by(errors: Array, scale: Array, allowed: Array, components: tuple[str, ...]) -> str:
