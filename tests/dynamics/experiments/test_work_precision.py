@@ -239,3 +239,12 @@ def test_another_start_has_another_exact_motion() -> None:
 def test_mistakes(arguments: dict[str, Any], said: str) -> None:
     with raises(ValueError, match=said):
         work_precision(**arguments)
+
+
+def test_a_start_without_rates_is_moved_and_said(tmp_path) -> None:
+    """A planet at the center that attracts it, where a model of one's own starts by default."""
+    text = "import cgraph as cg, dynamics as dyn\nmodel = dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2)"
+    (tmp_path / "planet.py").write_text(f"{text} + 1.0 / cg.sqrt(q[0] ** 2 + q[1] ** 2), 'x y')\n")
+    task = load(f"{tmp_path / 'planet.py'}:model")
+    assert any(task.q)
+    assert "q.x" in task.about

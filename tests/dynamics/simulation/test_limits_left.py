@@ -61,3 +61,13 @@ def test_a_bounce_leaves_no_limit_at_the_floor_and_rows_alone_may_miss_the_top()
 def test_a_motion_that_starts_at_a_limit_and_goes_inward_keeps_it() -> None:
     run = dyn.simulate(arm(), [0.7, 0.0], [0.0, 0.0], 0.3, dense_output=True)
     assert limits_left(run, {"position": {"joint 1": (-1.0, 0.7)}}, {"joint 1": "rad"}) == []
+
+
+@pytest.mark.parametrize("metre", [1.0, 1e6, 1e-6])
+def test_what_is_beyond_a_limit_by_rounding_alone_has_not_left_it(metre: float) -> None:
+    """Of the largest coordinate of its unit, in any unit: a finger that rests at its stop beside one that moves."""
+    fingers = dyn.Mechanism([dyn.Body(name, dyn.Joint("prismatic"), mass=1.0) for name in ("left", "right")], (0, 0, 0))
+    for beyond, told in ((2e-33, 0), (1e-14, 0), (1e-3, 1)):
+        run = dyn.simulate(fingers, [-beyond * metre, 0.0], [0.0, metre], 1.0)
+        said = limits_left(run, {"position": {"left": (0.0, metre)}}, dict.fromkeys(("left", "right"), "m"))
+        assert len(said) == told

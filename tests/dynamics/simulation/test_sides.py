@@ -59,3 +59,18 @@ def test_the_rate_of_a_model_jumps_or_kinks_by_what_differences_say() -> None:
     assert found["qd.x - belt"] == ("jump", {"qd0_dot": pytest.approx(high - low)})
     assert found["q.x - 1"] == ("kink", {"qd0_dot": pytest.approx(-3.0)})
     assert all(set(each.tags) == {"force"} for each in surfaces(model, at))
+
+
+def test_a_start_from_which_no_sides_let_the_motion_go_on_is_a_trajectory_of_one_row() -> None:
+    """Signs that multiply: of the four pairs none stays, and no mixture of them holds the origin."""
+
+    def rate(x: list[cg.Node], t: cg.Node) -> list[cg.Node]:
+        a, b = map(cg.sign, x)
+        return [2.0 * b + a - a * b - 1.0, 1.0 - 2.0 * a - 2.0 * a * b]
+
+    with pytest.warns(dyn.SimulationWarning, match="no sides of the surfaces"):
+        run = dyn.simulate(dyn.OdeSystem(rate, "x y"), [0.0, 0.0], None, 1.0)
+    assert not run.success
+    assert run.modes is not None
+    assert run.t.tolist() == [0.0]
+    assert run.modes.sides.shape == (0, 2)
