@@ -102,7 +102,7 @@ def inspection(
     try:
         versions |= {each.name: each for each in _hamilton(scene)}
     except ValueError as error:  # a constraint, or a kinetic energy that gives no momenta
-        lacking = f"No equations in momenta: {error}"
+        lacking = f"No equations in momenta: {error}."
     derived = _derived(system, momenta=not lacking)
     places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)

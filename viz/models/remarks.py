@@ -19,6 +19,4 @@ def tree_alone(scene: scenes.Scene) -> str:
     more = f" and {len(held) - SHOWN} more" if len(held) > SHOWN else ""
     what = f"{'loop' if loops else 'constraint'}{'s' if len(held) > 1 else ''}"
     names = f"{', '.join(held[:SHOWN])}{more}"
-    return (
-        f"Inverse dynamics is that of the tree, without the forces of the {what} {names}: forward dynamics has these."
-    )
+    return f"Inverse dynamics is without the forces of the {what} {names}: forward dynamics has these."
