@@ -49,7 +49,7 @@ LAZY = {
 }
 MOST_LAZY = 10
 LINES = {  # at most; whoever makes room writes the lower number, and nobody a higher one
-    "packages": 62_731,
+    "packages": 62_729,
     "tests": 40_996,
     "bench": 4_474,
     "pages": 5_296,
