@@ -18,14 +18,13 @@ if TYPE_CHECKING:
     from .codegen.disk_cache import clear_cache as clear_cache
     from .codegen.javascript import to_js as to_js
     from .core.checks import GraphError as GraphError
-    from .core.graph import Counts as Counts, Edge as Edge, Graph as Graph
+    from .core.graph import Counts as Counts, Edge as Edge, Graph as Graph, html as html
     from .core.node import Node as Node, constant as constant, variable as variable
     from .core.scope import tag as tag
     from .explain.compare import compare as compare
     from .explain.lint.lint import lint as lint
-    from .explain.why import why as why
+    from .explain.why import why as why, why_not as why_not
     from .explain.why_nan import why_nan as why_nan
-    from .explain.why_not import why_not as why_not
     from .operations import abs as abs, round as round
     from .operations.interpolation import interp as interp
     from .operations.table import (
@@ -68,7 +67,6 @@ if TYPE_CHECKING:
     from .program.functions.compiled import Compiled as Compiled, compile as compile
     from .simplification.simplify import simplify as simplify, specialize as specialize
     from .util.caches import clear_caches as clear_caches
-    from .writing.html import html as html
     from .writing.latex import latex as latex
     from .writing.naming import variables as variables, with_name as with_name
     from .writing.networkx_queries import from_networkx as from_networkx, to_networkx as to_networkx
@@ -79,7 +77,7 @@ if TYPE_CHECKING:
 if not TYPE_CHECKING:  # a checker shall see a misspelt name
 
     def _of_row(name):
-        from .operations.functions import of_name
+        from .operations.operation import of_name
 
         return of_name(name)  # `cg.name` of a row that was added to the table
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from .autodiff.jets import Jets as Jets
     from .autodiff.symmetric_elimination import ldl_solve as ldl_solve
     from .bridges.translation import Operations as Operations, operations as operations
+    from .codegen.disk_cache import cache_choice as cache_choice
     from .core.checks import check_name as check_name
     from .core.evaluation import (
         Array as Array,
@@ -21,11 +22,12 @@ if TYPE_CHECKING:
     from .core.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
     from .core.label import SMOOTH as SMOOTH, UNLABELLED as UNLABELLED
     from .core.scope import formulating as formulating, without_collection as without_collection
+    from .core.traversal import descendants as descendants
     from .explain.lint.lint import Lint as Lint
-    from .explain.paths import descendants as descendants
     from .explain.why_nan import WhyNan as WhyNan
     from .operations.bounds import intervals as intervals
     from .operations.operation import columns as columns
+    from .operations.records import HoldsNodes as HoldsNodes
     from .program.derivatives.jvp import Passes as Passes
     from .program.derivatives.transpose import (
         Along as Along,
@@ -36,14 +38,14 @@ if TYPE_CHECKING:
     )
     from .program.runners.batch_code import LaneCode as LaneCode
     from .program.statement import with_names as with_names
-    from .simplification.identities import shortened as shortened
-    from .simplification.ordered_terms import ink as ink
-    from .simplification.polynomial import (
+    from .program.statements.rows import for_rows as for_rows
+    from .simplification.canonical import (
         Polynomial as Polynomial,
         expand as expand,
         format_polynomial as format_polynomial,
     )
-    from .simplification.reading_form import reading_form as reading_form
+    from .simplification.identities import shortened as shortened
+    from .simplification.reading_form import ink as ink, reading_form as reading_form
     from .simplification.rounding_growth import (
         error_bounds as error_bounds,
         rounding_noise as rounding_noise,
@@ -69,11 +71,15 @@ if TYPE_CHECKING:
         require_texts as require_texts,
         require_whole as require_whole,
     )
-    from .util.threads import share as share, thread_count as thread_count
+    from .util.threads import share as share, thread_count as thread_count, write_batch as write_batch
     from .util.words import counted as counted, entry as entry, nearest as nearest, or_nearest as or_nearest
     from .writing.formulas import Side as Side, entries_of as entries_of, fraction as fraction, statements as statements
-    from .writing.holds_nodes import HoldsNodes as HoldsNodes
-    from .writing.latex import LATEX as LATEX, latex_block as latex_block, number_text as number_text
+    from .writing.latex import (
+        LATEX as LATEX,
+        formula_tree as formula_tree,
+        latex_block as latex_block,
+        number_text as number_text,
+    )
     from .writing.naming import Remarks as Remarks, remarked as remarked, remarks_of as remarks_of
     from .writing.symbols import GREEK as GREEK, is_letter as is_letter, symbol as symbol
 

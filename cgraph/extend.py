@@ -23,10 +23,10 @@ operation has none.
 point.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`,
-`FixedPoint`; `copied` and `added` are the plainest), and `runner` makes it a `Runner`, machine code or Python.
-`program_jvp` and `program_vjp` are its derivatives, `many` is what memories side by side run. `register_statement` adds
-a `StatementRow` for a `Statement` to `STATEMENTS`, with `require_length` for its check; `effects` says what statements
-read and write.
+`FixedPoint`, and `For` over rows of a table; `copied` and `added` are the plainest), and `runner` makes it a `Runner`,
+machine code or Python. `program_jvp` and `program_vjp` are its derivatives, `many` is what memories side by side run.
+`register_statement` adds a `StatementRow` for a `Statement` to `STATEMENTS`, with `require_length` for its check;
+`effects` says what statements read and write.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -79,6 +79,7 @@ if TYPE_CHECKING:
     from .program.statements.call import Call as Call, Map as Map, Sum as Sum, added as added, copied as copied
     from .program.statements.control import FixedPoint as FixedPoint, If as If, While as While
     from .program.statements.matrix import Factor as Factor, Solve as Solve
+    from .program.statements.rows import For as For
     from .simplification.simplify import with_reciprocals as with_reciprocals
     from .writing.formulas import Formulas as Formulas, Notation as Notation
 

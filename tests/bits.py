@@ -17,12 +17,12 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import Array, columns
 from dynamics.equations.state_equation import normalization, state_equation, state_inputs
-from dynamics.equations.substitute import substitute
 from dynamics.integrators.step import weighted
 from dynamics.integrators.tableau import RK4
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import prepare
 from dynamics.systems.arguments import TIME
+from dynamics.systems.kinematics import substitute
 from tests.javascript import stepped_by_js
 from tests.repeated import repeated
 
@@ -38,7 +38,9 @@ class Motion:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.rate, self.start = rate_and_start(scene)
+        self.rate, known = state_equation(scene.model), state_inputs(scene.model)
+        values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
+        self.start = [float(values.get(name, 0.0)) for name in self.rate.input_names]  # torques and the time are 0
         self.states = len(self.rate.outputs)
         self.step, self.carry = _step(self.rate)
         self.calls_library = any([columns(node.op).calls_library for node in self.rate.nodes if node.args])
@@ -119,13 +121,6 @@ class Motion:
         run = moving(scene.q, qd, times[-1], t_eval=times)
         assert run.stats.success
         return digest(run.q if qd is None else np.concatenate([run.q, run.qd], axis=1))
-
-
-def rate_and_start(scene: Scene) -> tuple[Graph, list[float]]:
-    """The state equation and the start, a value of every input."""
-    rate, known = state_equation(scene.model), state_inputs(scene.model)
-    values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
-    return rate, [float(values.get(name, 0.0)) for name in rate.input_names]  # torques and the time are 0
 
 
 def rows_of(step: Graph, carry: dict[str, str], start: list[float], states: int, backend: str) -> Array:

@@ -16,11 +16,6 @@ def pushed():
     return dyn.OdeSystem(lambda x, t: [x[1], -cg.sin(x[0]) + 0.1 * cg.cos(t) * x[0] ** 2], ["x", "v"])
 
 
-def open_masses():
-    """A mechanism whose masses and gravity are parameters, which a run may not build in."""
-    return adjustable(dyn.scenes.load("triple_pendulum")).model
-
-
 def oscillator():
     """A motion without a function of the C library."""
     return dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * q[0] ** 2 - 0.1 * q[0] ** 4 * t, ["x"])
@@ -28,7 +23,7 @@ def oscillator():
 
 MODELS = {
     "oscillator": oscillator,
-    "open masses": open_masses,
+    "open masses": lambda: adjustable(dyn.scenes.load("triple_pendulum")).model,  # which a run may not build in
     "triple_pendulum": lambda: dyn.scenes.load("triple_pendulum"),
     "pushed": pushed,
     "free": lambda: dyn.Mechanism([dyn.Body("base", dyn.Joint("free"), mass=2.0, center=[0.1, 0.0, 0.2],

@@ -4,7 +4,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +26,8 @@ WIDE = """() => {
   const sideways = document.scrollingElement.scrollWidth - innerWidth;
   return [...(sideways > 0 ? [sideways] : []), ...[...over, ...scrolling].map((box) => box.outerHTML.slice(0, 200))];
 }"""
-LOCAL = ("file:", "data:")
 
+Visit = Callable[..., Any]
 pytestmark = pytest.mark.timeout(600)  # s: the pages are built first
 
 
@@ -54,28 +54,10 @@ def pages(site: Path) -> list[Path]:
     return sorted(path for path in site.rglob("*.html") if "_static" not in path.parts)
 
 
-@pytest.fixture
-def new_page(browser: Any) -> Iterator[Any]:
-    """A function that opens an empty page; it may neither ask the net for anything nor complain."""
-    said: list[str] = []
-
-    def opened(**options: Any) -> Any:
-        page = browser.new_page(**options)
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: said.append(request.url) if request.url[:5] not in LOCAL else None)
-        return page
-
-    yield opened
-    for context in browser.contexts:
-        context.close()
-    assert said == []
-
-
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
-def test_nothing_is_wider_than_its_column(new_page: Any, pages: list[Path], width: int, scheme: str) -> None:
+def test_nothing_is_wider_than_its_column(visit: Visit, pages: list[Path], width: int, scheme: str) -> None:
     """On a wide page nothing scrolls; on a narrow one a table or formula may, if its box shows it."""
-    page, wide = new_page(viewport={"width": width, "height": 900}, color_scheme=scheme), {}
+    page, wide = visit(pages[0], "", width, 900, color_scheme=scheme), {}
     for path in pages:
         page.goto(path.as_uri())
         if found := page.evaluate(WIDE.replace("WIDTH", str(width))):
@@ -92,9 +74,8 @@ WORDS = {
 
 
 @pytest.mark.parametrize("words", WORDS)
-def test_search_finds(new_page: Any, site: Path, words: str) -> None:
-    page = new_page()
-    page.goto(f"{(site / 'search.html').as_uri()}?q={words.replace(' ', '+')}")
+def test_search_finds(visit: Visit, site: Path, words: str) -> None:
+    page = visit(site / "search.html", f"?q={words.replace(' ', '+')}")
     page.wait_for_selector("#search-results li a")
     titles = page.locator("#search-results li a").all_text_contents()[:8]
     assert any(WORDS[words] in title for title in titles), titles
@@ -140,10 +121,9 @@ def test_the_reference_has_no_docstrings_of_python_s_own(pages: list[Path]) -> N
 
 
 def test_a_page_is_at_work_on_the_front_page_and_its_picture_stands_there_without_a_script(
-    new_page: Any, site: Path
+    visit: Visit, site: Path
 ) -> None:
-    page = new_page(viewport={"width": 1400, "height": 900})
-    page.goto((site / "index.html").as_uri())
+    page = visit(site / "index.html", "", 1400, 900)
     picture = page.locator(".live-picture img")
     page.locator(".live-frame").scroll_into_view_if_needed()
     live = page.frame_locator(".live-frame")

@@ -95,11 +95,6 @@ def role_of(node: Node) -> str:
     return next(iter(known), PRIMAL)
 
 
-def tag_colors(tags: Iterable[str]) -> dict[str, str]:
-    """A color for each tag, the same for the same set of tags whatever their order; more than seven repeat."""
-    return {tag: SERIES[i % len(SERIES)] for i, tag in enumerate(sorted(set(tags), key=natural_order))}
-
-
 def natural_order(text: str) -> tuple[tuple[bool, int, str], ...]:
     """Sorting key by which "link 2" comes before "link 10"."""
     return tuple((part.isdigit(), int(part) if part.isdigit() else 0, part) for part in re.split(r"([0-9]+)", text))

@@ -23,9 +23,8 @@ from heapq import heapify, heappop, heappush
 
 from ..core.builder import Builder
 from ..core.node import Node, as_node, variable
-from .elimination_order import EliminationStep, nodes_of
-from .schur_elimination import ONE, EdgePushing
-from .symmetric_elimination import ZERO, PivotRow, SymmetricMatrix
+from .schur_elimination import ONE, EdgePushing, EliminationStep, nodes_of
+from .symmetric_elimination import ZERO, PivotRow
 
 # Variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes.
 LEAF = 1.85
@@ -263,26 +262,11 @@ class BalancedElimination(EdgePushing):
         return self._depths[node]
 
 
-class WrittenMatrix(SymmetricMatrix):
-    """A matrix that notes the unknowns whose rows are written to."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.written: set[Node] = set()
-
-    def add(self, a: Node, b: Node, value: Node) -> None:
-        """Add as the base class does, and notice."""
-        if value.value != 0.0:
-            self.written |= {a, b}
-        super().add(a, b, value)
-
-
 def written_rows(equations: EdgePushing, plan: Sequence[EliminationStep]) -> list[set[Node]]:
     """The unknowns that each step leaves entries of W with, when all leave in the order of the plan."""
-    equations.matrix = matrix = WrittenMatrix()
     rows = []
     for step in plan:
+        equations.matrix.written = set()
         equations.reduce(step)
-        rows.append(matrix.written)
-        matrix.written = set()
+        rows.append(equations.matrix.written)
     return rows

@@ -10,9 +10,8 @@ from ..core.node import Node, as_node, variable
 from ..operations.table import equal
 from ..simplification.simplify import simplify
 from ..util.require import require_graph
-from .coloring import NONE, Coloring, column_coloring
-from .direction_split import direction_split
-from .products import jvp
+from .coloring import column_coloring
+from .products import direction_split, jvp
 from .sparsity import pattern, written_sizes
 
 LANES = 8  # colors that cost one sweep
@@ -66,15 +65,7 @@ def compressed_jacobian(
     known = split.linear.inputs[: len(split.primal.outputs)]
     seeds = [equal(color, float(each)) for each in coloring.columns]
     product = Graph([*known, color], split.linear(*known, *seeds))
-    return CompressedJacobian(colors, split.primal, product, _placed(entries.by_row(), coloring, n))
-
-
-def _placed(rows: Sequence[Sequence[int]], coloring: Coloring, n: int) -> Graph:
-    colors = coloring.counts[0]
-    sums = [[variable(f"sum{i}_{c}") for c in range(colors)] for i in range(len(rows))]
-    zero = as_node(0.0)
-    outputs: dict[str, Node] = {}
-    for i, row in enumerate(rows):
-        place = {j: sums[i][coloring.columns[j]] for j in row if coloring.columns[j] != NONE}
-        outputs |= {f"{i}_{j}": place.get(j, zero) for j in range(n)}
-    return Graph([each for row in sums for each in row], outputs)
+    sums = [[variable(f"sum{i}_{c}") for c in range(colors)] for i in range(len(graph.outputs))]
+    placed = {f"{i}_{j}": as_node(0.0) for i in range(len(sums)) for j in range(n)}
+    placed |= {f"{i}_{j}": sums[i][coloring.columns[j]] for i, row in enumerate(entries.by_row()) for j in row}
+    return CompressedJacobian(colors, split.primal, product, Graph([each for row in sums for each in row], placed))

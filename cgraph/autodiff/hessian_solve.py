@@ -12,12 +12,11 @@ from ..core.label import ADJOINT, TANGENT
 from ..core.node import Node, Scalar, as_node
 from ..core.reverse import cotangents
 from ..core.scope import building
-from ..core.traversal import topological
+from ..core.traversal import descendants, topological
 from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag, require_graph, require_sequence
 from .balanced_elimination import BalancedElimination, written_rows
-from .elimination_order import EliminationStep, elimination_steps, nodes_of
-from .schur_elimination import EdgePushing
+from .schur_elimination import EdgePushing, EliminationStep, elimination_steps, nodes_of
 
 Order = Literal["recursive", "balanced"]
 
@@ -82,15 +81,9 @@ def hessian_solve(
     """
     require_graph("hessian_solve", graph)
     chosen = graph.select_inputs(wrt)
-    rhs = require_sequence("rhs", rhs, "numbers and nodes", (Node, Real))
+    entries = [as_node(value) for value in require_sequence("rhs", rhs, "numbers and nodes", (Node, Real))]
     require_choice("order", order, get_args(Order))
-    return solve_nodes(
-        graph.only_output(),
-        chosen,
-        [as_node(value) for value in rhs],
-        check=require_flag("check", check),
-        order=order,
-    )
+    return solve_nodes(graph.only_output(), chosen, entries, check=require_flag("check", check), order=order)
 
 
 @explain_failure
@@ -166,7 +159,9 @@ def _solved(
     """W t = b, solved: all tangents."""
     if len(rhs) != len(wrt):
         raise ValueError(f"rhs needs one entry for each of the {len(wrt)} variables, got {len(rhs)}")
-    nodes, entries = _dependent([output, *at], wrt), dict(zip(wrt, rhs, strict=True))
+    entries, reached = dict(zip(wrt, rhs, strict=True)), topological([output, *at])
+    used, depends = set(reached), descendants(reached, wrt)
+    nodes = [node for node in wrt if node not in used] + [node for node in reached if node in depends]
     with building(build):
         equations = EdgePushing(build, output, entries, at, nodes)
         passed = equations.arguments(_rows(output, multipliers, wrt))
@@ -210,15 +205,3 @@ def _rows(output: Node, multipliers: Collection[Node], wrt: Sequence[Node]) -> d
     if wrong := [s for s, reached in rows.items() if not reached.isdisjoint(multipliers)]:
         raise ValueError(f"the output must be linear in the multipliers, got {wrong[0]!r} with a slope that has one")
     return {s: [w for w in wrt if w in reached] for s, reached in rows.items()}
-
-
-def _dependent(outputs: Sequence[Node], wrt: Sequence[Node]) -> list[Node]:
-    """The nodes that depend on `wrt`, arguments first, each variable just before its first use."""
-    depends = set(wrt)
-    order = []
-    for node in topological(outputs):
-        if node in depends or any([arg in depends for arg in node.args]):
-            depends.add(node)
-            order.append(node)
-    used = set(order)
-    return [node for node in wrt if node not in used] + order

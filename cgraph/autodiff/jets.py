@@ -18,7 +18,7 @@ from ..core.node import CONSTANT, Node, as_node, constant, variable
 from ..core.row import Row
 from ..core.scope import building
 from ..operations.operation import columns
-from ..operations.series import by_partials
+from ..operations.series import Kind, by_partials
 from ..operations.table import equal, where
 from ..simplification.simplify import simplify
 from ..util.require import require_flag, require_graph, require_whole
@@ -130,9 +130,6 @@ def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:
     return _Jets(rate, check_name("the time", time), require_flag("exact", exact)).graphs()
 
 
-_ENDLESS = "{op} has no Taylor series: its partials need partials of new nodes, and those again, {rounds} times over"
-
-
 class _Shared:
     """Builds nodes as they are written, shared; what is folded of one argument alone, as -(-x), rounds nothing."""
 
@@ -174,7 +171,7 @@ class _Jets:
         self.unit, self.k = variables(["unit", "order"])
         self.of: dict[Node, Node | None] = {}  # {node: its coefficient k, None where it is constant}
         self.zeros: dict[Node, Node] = {}  # {node: the variable that holds its coefficient 0}
-        self.sums: dict[tuple[Node, Node, str], Node] = {}  # {(a, b, kind): the sum of (j) a_j b_k-j}
+        self.sums: dict[tuple[Node, Node, Kind], Node] = {}  # {(a, b, kind): the sum of (j) a_j b_k-j}
         self.sides: dict[Node, Node] = {}  # {piecewise node: the variable that holds its side}
         self.switches: list[Node] = []  # what decides them
         self.rounds: dict[Node, int] = {}  # {partial: how many operations were differentiated one after another for it}
@@ -191,7 +188,8 @@ class _Jets:
                 node = self.waiting.pop()
                 self.round = self.rounds.get(node, 0)
                 if self.round > ROUNDS:
-                    raise NoSeriesError(_ENDLESS.format(op=node.op.name, rounds=ROUNDS))
+                    endless = f"its partials need partials of new nodes, and those again, {ROUNDS} times over"
+                    raise NoSeriesError(f"{node.op.name} has no Taylor series: {endless}")
                 self.at(node)
 
     def graphs(self) -> Jets:
@@ -219,23 +217,12 @@ class _Jets:
             return node
         return self.zeros.setdefault(node, variable(f"zero{len(self.zeros)}"))
 
-    def sum(self, a: Node, b: Node) -> Node:
-        """The sum over 0 < j < k of a_j b_k-j."""
-        return self._sum(a, b, "")
-
-    def safe_sum(self, a: Node, b: Node) -> Node:
-        """The sum over 0 < j < k of a_j b_k-j, in which zeros win over what is not finite."""
-        return self._sum(a, b, "safe")
-
-    def weighted_sum(self, a: Node, b: Node) -> Node:
-        """The sum over 0 < j < k of j a_j b_k-j."""
-        return self._sum(a, b, "weighted")
-
-    def _sum(self, a: Node, b: Node, kind: str) -> Node:
+    def sum(self, a: Node, b: Node, kind: Kind = "plain") -> Node:
+        """The sum over 0 < j < k of a_j b_k-j, or one of another kind, see `Orders`."""
         for x in (a, b):
             if (scaled := _scaled(x)) is not None:
                 factor, inner = scaled
-                return factor * (self._sum(inner, b, kind) if x is a else self._sum(a, inner, kind))
+                return factor * (self.sum(inner, b, kind) if x is a else self.sum(a, inner, kind))
         for node in (a, b):
             if node not in self.of:
                 self.waiting.append(node)

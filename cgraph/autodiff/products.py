@@ -1,14 +1,21 @@
-"""Products: graphs of J x_dot and J^T y_bar of a graph, one sweep each, and of the Hessian times x_dot, two."""
+"""Products: graphs of J x_dot and J^T y_bar of a graph, one sweep each, and of the Hessian times x_dot, two.
+
+A product comes in two, too: what the point alone decides, and what has to be done again for every direction.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from ..core.builder import Builder
 from ..core.forward import tangents
 from ..core.graph import Graph
 from ..core.node import Node, as_node, variable
 from ..core.reverse import cotangents
+from ..core.traversal import descendants, rebuild
+from ..operations.operation import OPS
 from ..util.require import require_graph
 from ..writing.naming import free_suffix
 
@@ -178,3 +185,55 @@ def hvp(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> G
     require_graph("hvp", graph)
     chosen, build = graph.select_inputs(wrt), Builder()
     return forward_products(_gradient(graph, chosen, build), chosen, zero_wins=True, build=build)
+
+
+class DirectionSplit(NamedTuple):
+    """A derivative x, s -> y, linear in the direction s, as y = linear(primal(x), s).
+
+    primal: x -> p, values that the other part reads.  linear: p, s -> y.
+    """
+
+    primal: Graph
+    linear: Graph
+
+    @property
+    def directions(self) -> int:
+        """The number of entries of a direction."""
+        return len(self.linear.inputs) - len(self.primal.outputs)
+
+
+def direction_split(derivative: Graph, directions: int, *, divide: bool = True) -> DirectionSplit:
+    """The two parts of a derivative whose last `directions` inputs are the direction, as of `jvp` and `vjp`.
+
+    divide: whether the linear part may divide, and hold infinite constants. If not, it reads reciprocals and such
+    constants from the primal part: then what it reads is infinite or NaN wherever a slope is.
+    """
+    count = len(derivative.inputs) - directions
+    points, seeds = derivative.inputs[:count], derivative.inputs[count:]
+    directional = descendants(derivative.nodes, seeds)
+    reciprocals: dict[Node, Node] = {}  # of divisors
+    factors: dict[Node, Node] = {}  # of a quotient: the reciprocal of its divisor
+    wanted: list[Node] = []  # what the linear part reads of the primal one
+    for node in derivative.nodes:
+        if not node.args or node not in directional:
+            continue
+        args = node.args
+        if not divide and node.op is OPS["div"]:
+            factors[node] = reciprocals.setdefault(args[1], Node(node.op, (as_node(1.0), args[1])))
+            args = (args[0], factors[node])
+        fixed = {arg for arg in args if arg.value is not None and (divide or math.isfinite(arg.value))}
+        wanted += [arg for arg in args if arg not in directional and arg not in fixed]
+    wanted += [node for node in derivative.outputs.values() if node not in directional and node.value is None]
+    read = {node: variable(f"p{k}") for k, node in enumerate(dict.fromkeys(wanted))}
+    stands = [*read.values()] or [variable("p0")]
+    replace = read | {seed: variable(f"s{k}") for k, seed in enumerate(seeds)}
+
+    def copied(node: Node, args: tuple[Node, ...]) -> Node:
+        if node in factors:
+            return Node(OPS["mul"], (read[factors[node]], args[0]), node.label)
+        return Node(node.op, args, node.label)
+
+    new = rebuild(derivative.outputs.values(), replace, copied)
+    outputs = {name: new[node] for name, node in derivative.outputs.items()}
+    linear = Graph([*stands, *[replace[seed] for seed in seeds]], outputs)
+    return DirectionSplit(Graph(points, {str(each.name): node for node, each in read.items()} or {"p0": 0.0}), linear)

@@ -43,7 +43,6 @@ class _Sum(NamedTuple):
     sin: Node
     cos_sign: float
     sin_sign: float
-    products: tuple[Node, ...]
 
 
 def rotations(order: Sequence[Node], depends: Collection[Node], kept: Collection[Node]) -> list[Rotation]:
@@ -73,7 +72,7 @@ def rotations(order: Sequence[Node], depends: Collection[Node], kept: Collection
         # c a + s b and +-(c b - s a): the products of the signs have to differ.
         elif other.cos_sign * other.sin_sign == -this.cos_sign * this.sin_sign:
             p, q = (other, this) if other.cos_sign == other.sin_sign else (this, other)
-            products = p.products + q.products
+            products = p.node.args + q.node.args
             pairs.append(Rotation(p.node, q.node, p.a, p.b, p.cos, p.sin, p.cos_sign, q.cos_sign, products))
     return pairs
 
@@ -85,7 +84,7 @@ def _constant_pair(one: _Sum, other: _Sum) -> Rotation | None:
     sign = math.copysign(1.0, at_y.value * c.value)  # type: ignore[operator]
     if max(abs(at_y.value - sign * c.value), abs(at_x.value + sign * s.value)) > ANGLE_ROUNDING:  # type: ignore[operator]
         return None
-    return Rotation(one.node, other.node, one.a, one.b, c, s, 1.0, sign, one.products + other.products)
+    return Rotation(one.node, other.node, one.a, one.b, c, s, 1.0, sign, one.node.args + other.node.args)
 
 
 def _sum(node: Node, depends: Collection[Node], uses: dict[Node, int]) -> _Sum | None:
@@ -104,10 +103,10 @@ def _sum(node: Node, depends: Collection[Node], uses: dict[Node, int]) -> _Sum |
     if len(constants) == 2:
         (c, a), (s, b) = constants
         unit = a is not b and abs(c * c + s * s - 1.0) <= ANGLE_ROUNDING
-        return _Sum(node, a, b, constant(c), constant(s), 1.0, 1.0, node.args) if unit else None
+        return _Sum(node, a, b, constant(c), constant(s), 1.0, 1.0) if unit else None
     if len(parts) < 2:
         return None
     (cos, a, cos_sign), (sin, b, sin_sign) = parts["cos"], parts["sin"]
     if cos.args != sin.args or a is b:
         return None
-    return _Sum(node, a, b, cos, sin, cos_sign, sin_sign, node.args)
+    return _Sum(node, a, b, cos, sin, cos_sign, sin_sign)

@@ -18,7 +18,7 @@ from ..core.reverse import cotangents
 from ..core.row import Row
 from ..core.scope import building
 from ..util.caches import OPERATIONS, memo
-from ..util.extras import scipy_module
+from ..util.extras import required
 from ..util.require import require_graph
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
            [0, 0, 0]])
     """
     require_graph("sparsity", graph)
-    sparse = scipy_module("sparse", "sparsity")
+    sparse = required("scipy.sparse", "sparsity needs SciPy", "scipy")
     entries = pattern(graph, graph.select_inputs(wrt))
     found: csr_array = sparse.csr_array(
         (np.ones(len(entries.rows), dtype=bool), *entries.compressed()), shape=entries.shape
@@ -159,20 +159,21 @@ def slopes(node: Node) -> Collection[Node]:
     """The arguments in which a node's partial derivative is not the constant zero."""
     if not node.args:
         return ()
-    if all([arg.value is None for arg in node.args]):
-        return [node.args[slot] for slot in _sloping_slots(node.op)]
+    special = any([arg.value is not None for arg in node.args])
+    return [node.args[slot] for slot in (_sloping_slots(node) if special else _usual_slots(node.op))]
+
+
+def _sloping_slots(node: Node) -> list[int]:
+    """The slots in which a node has a slope."""
     with building(Builder()):
         partials = [as_node(each) for each in node.op.partials(node, *node.args)]
-    return [arg for arg, partial in zip(node.args, partials, strict=True) if partial.value != 0.0]
+    return [slot for slot, partial in enumerate(partials) if partial.value != 0.0]
 
 
 @memo(OPERATIONS)
-def _sloping_slots(op: Row) -> list[int]:
+def _usual_slots(op: Row) -> list[int]:
     """The slots in which an operation on variables has a slope."""
-    arguments = [variable(f"argument{slot}#") for slot in range(op.arity)]
-    with building(Builder()):
-        partials = [as_node(each) for each in op.partials(variable("output#"), *arguments)]
-    return [slot for slot, partial in enumerate(partials) if partial.value != 0.0]
+    return _sloping_slots(Node(op, tuple([variable(f"argument{slot}#") for slot in range(op.arity)])))
 
 
 def written_sizes(graph: Graph, wrt: Sequence[Node]) -> tuple[int, int, int]:

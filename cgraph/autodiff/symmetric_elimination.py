@@ -40,10 +40,14 @@ class PivotRow(NamedTuple):
 
 
 class SymmetricMatrix:
-    """A sparse matrix with rows and columns named by nodes: entries W_ab = W_ba in both rows; an absent one is zero."""
+    """A sparse matrix with rows and columns named by nodes: entries W_ab = W_ba in both rows; an absent one is zero.
+
+    written: the unknowns whose rows have been added to.
+    """
 
     def __init__(self) -> None:
         self._rows: dict[Node, dict[Node, Node]] = {}
+        self.written: set[Node] = set()
 
     def row(self, a: Node) -> Mapping[Node, Node]:
         """The entries {b: W_ab} of a row."""
@@ -53,6 +57,7 @@ class SymmetricMatrix:
         """W_ab += value, and W_ba with it."""
         if value.value == 0.0:
             return
+        self.written |= {a, b}
         row = self._rows.setdefault(a, {})
         total = _sum(row[b], value) if b in row else value
         row[b] = total

@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..autodiff.jacobian import jacobian
-from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..operations.operation import columns
 from ..program.functions.compiled import Compiled
 from ..util.extras import required
 from ..util.require import require_graph
-from .derived import derived, require_compiled, values_at
-from .translation import Operations, operations, translated
+from .translation import Operations, derived, operations, require_compiled, require_inputs, translated, values_at
 
 if TYPE_CHECKING:
     from jax import Array as JaxArray
@@ -72,7 +70,7 @@ def to_jax(graph: Graph) -> Function:
         x = jnp.asarray(x)
         if not jnp.issubdtype(x.dtype, jnp.floating):
             x = x.astype(float)
-        _require_inputs(x.shape, len(graph.inputs))
+        require_inputs(x.shape, len(graph.inputs))
         env = {node: x[..., k] for k, node in enumerate(graph.inputs)}
         smallest = float(jnp.finfo(x.dtype).tiny)  # in place of constants that would be 0 in these numbers
         number = lambda value: float(np.copysign(max(abs(value), smallest), value)) if value else 0.0  # noqa: E731
@@ -130,7 +128,7 @@ def as_jax(fn: Compiled) -> Function:
                 f"as_jax calls machine code for float64, got {x.dtype}: "
                 'begin with jax.config.update("jax_enable_x64", True), and give floats'
             )
-        _require_inputs(x.shape, fn.n_in)
+        require_inputs(x.shape, fn.n_in)
         return called(x)
 
     return function
@@ -176,11 +174,6 @@ class _Called:
             return function(x), (self.slope.function(x) * direction).sum(axis=-1)
 
         return function  # type: ignore[no-any-return]
-
-
-def _require_inputs(shape: tuple[int, ...], n_in: int) -> None:
-    if not shape or shape[-1] != n_in:
-        raise GraphError(f"x must have shape (..., {n_in}), one value for each input, got {shape}")
 
 
 def jax_operations(jax: ModuleType) -> Operations:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..core.checks import GraphError
 from ..program.functions.compiled import Compiled
 from ..util.extras import required
-from .derived import require_compiled
+from .translation import require_compiled
 
 if TYPE_CHECKING:
     from scipy import LowLevelCallable

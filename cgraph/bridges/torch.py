@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property, partial
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..autodiff.products import jvp, vjp
-from ..core.checks import GraphError
 from ..program.functions.compiled import Compiled
 from ..util.extras import required
 from ..util.require import require_kind
-from .derived import derived, require_compiled, values_at
+from .translation import derived, require_compiled, require_inputs, values_at
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -59,63 +57,46 @@ def to_torch(fn: Compiled) -> Callable[[Tensor], Tensor]:
     """
     require_compiled("to_torch", fn)
     torch = required("torch", "to_torch needs PyTorch", "torch")
-    return partial(_checked, torch, _call(torch).apply, _WithDerivatives(fn))
+    call: Callable[..., Tensor] = _call(torch).apply
 
+    def function(x: Tensor) -> Tensor:
+        require_kind("x", x, torch.Tensor, "a tensor")
+        if x.dtype != torch.float64 or x.device.type != "cpu":
+            raise TypeError(f"to_torch calls machine code for float64 on the CPU, got {x.dtype} on {x.device}")
+        require_inputs(tuple(x.shape), fn.n_in)
+        return call(fn, x)
 
-def _checked(torch: ModuleType, call: Callable[..., Tensor], of: _WithDerivatives, x: Tensor) -> Tensor:
-    require_kind("x", x, torch.Tensor, "a tensor")
-    if x.dtype != torch.float64 or x.device.type != "cpu":
-        raise TypeError(f"to_torch calls machine code for float64 on the CPU, got {x.dtype} on {x.device}")
-    if not x.shape or x.shape[-1] != of.fn.n_in:
-        raise GraphError(f"x must have shape (..., {of.fn.n_in}), one value for each input, got {tuple(x.shape)}")
-    return call(of, x)
-
-
-class _WithDerivatives:
-    """A compiled graph and its derivatives, made at the first use."""
-
-    def __init__(self, fn: Compiled) -> None:
-        self.fn = fn
-
-    @cached_property
-    def pulled(self) -> _WithDerivatives:
-        """(x, y_bar) -> x_bar."""
-        return _WithDerivatives(derived(self.fn, vjp))
-
-    @cached_property
-    def pushed(self) -> _WithDerivatives:
-        """(x, x_dot) -> y_dot."""
-        return _WithDerivatives(derived(self.fn, jvp))
+    return function
 
 
 def _call(torch: ModuleType) -> Any:
-    """The autograd.Function of a compiled graph with derivatives and a point, (..., n_in)."""
+    """The autograd.Function of a compiled graph and a point, (..., n_in)."""
 
     class Call(torch.autograd.Function):  # type: ignore[name-defined, misc]
         @staticmethod
-        def forward(of: _WithDerivatives, x: Tensor) -> Tensor:
-            values: Tensor = torch.from_numpy(np.ascontiguousarray(values_at(of.fn, x.detach().numpy())))
+        def forward(fn: Compiled, x: Tensor) -> Tensor:
+            values: Tensor = torch.from_numpy(np.ascontiguousarray(values_at(fn, x.detach().numpy())))
             return values
 
         @staticmethod
-        def setup_context(ctx: Any, inputs: tuple[_WithDerivatives, Tensor], output: Tensor) -> None:
-            ctx.of, x = inputs
+        def setup_context(ctx: Any, inputs: tuple[Compiled, Tensor], output: Tensor) -> None:
+            ctx.fn, x = inputs
             ctx.save_for_backward(x)
             ctx.save_for_forward(x)
 
         @staticmethod
         def backward(ctx: Any, y_bar: Tensor) -> tuple[None, Tensor]:
             (x,) = ctx.saved_tensors
-            return None, Call.apply(ctx.of.pulled, torch.cat([x, y_bar], -1))
+            return None, Call.apply(derived(ctx.fn, vjp), torch.cat([x, y_bar], -1))
 
         @staticmethod
-        def jvp(ctx: Any, of: None, x_dot: Tensor) -> Tensor:
+        def jvp(ctx: Any, fn: None, x_dot: Tensor) -> Tensor:
             (x,) = ctx.saved_tensors
-            y_dot: Tensor = Call.apply(ctx.of.pushed, torch.cat([x, x_dot], -1))
+            y_dot: Tensor = Call.apply(derived(ctx.fn, jvp), torch.cat([x, x_dot], -1))
             return y_dot
 
         @staticmethod
-        def vmap(info: Any, in_dims: tuple[None, int], of: _WithDerivatives, x: Tensor) -> tuple[Tensor, int]:
-            return Call.apply(of, x.movedim(in_dims[1], 0)), 0
+        def vmap(info: Any, in_dims: tuple[None, int], fn: Compiled, x: Tensor) -> tuple[Tensor, int]:
+            return Call.apply(fn, x.movedim(in_dims[1], 0)), 0
 
     return Call

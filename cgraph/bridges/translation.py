@@ -1,4 +1,4 @@
-"""Translation: nodes as expressions of another library, operation by operation."""
+"""Translation: nodes as expressions of another library, operation by operation; or compiled graphs, which it calls."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..core.checks import GraphError
-from ..core.node import Node
+from ..core.evaluation import Array
+from ..core.graph import Graph
+from ..core.node import Node, variable
 from ..operations.operation import Op, columns
+from ..program.functions.compiled import Compiled, compile
+from ..util.caches import kept_by_first
 
 Expression = TypeVar("Expression")
 Operations = Callable[[Op], Callable[..., Any]]  # of a row of the table: the function on expressions
@@ -58,3 +62,32 @@ def operations(library: str, modules: Sequence[object], table: Mapping[str, Call
         return found
 
     return function_of
+
+
+def require_compiled(what: str, fn: object) -> None:
+    """Raise TypeError, saying that the function `what` needs a compiled graph, for anything else."""
+    if not isinstance(fn, Compiled):
+        hint = "; write cg.compile(graph)" if isinstance(fn, Graph) else ""
+        raise TypeError(f"{what} needs a compiled graph, got {type(fn).__name__}: {fn!r:.60}{hint}")
+
+
+def require_inputs(shape: tuple[int, ...], n_in: int) -> None:
+    """Raise GraphError unless points of this shape have a value for each input."""
+    if not shape or shape[-1] != n_in:
+        raise GraphError(f"x must have shape (..., {n_in}), one value for each input, got {shape}")
+
+
+@kept_by_first
+def derived(fn: Compiled, transform: Callable[[Graph], Graph]) -> Compiled:
+    """The transformed graph, compiled in the same way. Inputs and outputs are numbered: names would grow by orders."""
+    inputs = [variable(f"x{k}") for k in range(fn.n_in)]
+    numbered = Graph(inputs, {f"y{k}": node for k, node in enumerate(fn.graph(*inputs).values())})
+    return compile(transform(numbered), fn.backend, **fn.options)
+
+
+def values_at(fn: Compiled, points: Array) -> Array:
+    """The outputs, (..., n_out), at points (..., n_in)."""
+    if points.ndim == 1:
+        return fn(points)
+    rows = points.reshape(-1, fn.n_in)
+    return fn.batch(rows.T).T.reshape(*points.shape[:-1], fn.n_out)

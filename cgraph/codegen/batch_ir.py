@@ -13,8 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from ..core.graph import Graph
-from .arithmetic import REGISTERS, Arithmetic
-from .function_writer import FunctionWriter
+from .function_writer import REGISTERS, Arithmetic, FunctionWriter
 from .llvm_ir import instructions, preamble
 
 MEMORY = 2**18  # bytes for inputs and outputs of a tile: a part of a core's second cache

@@ -17,7 +17,6 @@ from . import llvm_engine as llvm
 
 SHORT = ctypes.PYFUNCTYPE(None, *[ctypes.c_void_p] * 3)  # too short a call to give the interpreter away for
 LONG = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
-_STAYS = "a bound call holds addresses of this process: pickle the compiled graph and bind it again"
 _NO_ARGUMENTS = 4  # METH_NOARGS of CPython's methodobject.h
 
 # What CPython calls: `self` are bytes with the addresses of the function, its arguments and None
@@ -75,20 +74,21 @@ class _Method(ctypes.Structure):
     )
 
 
-class _Addresses(bytes):
+class _Stays:
+    """What is not to be copied."""
+
+    def __reduce_ex__(self, protocol: SupportsIndex) -> NoReturn:
+        raise TypeError("a bound call holds addresses of this process: pickle the compiled graph and bind it again")
+
+
+class _Addresses(_Stays, bytes):
     """Needs of a call, `self` of its function: as addresses, and as objects that stay alive with it."""
 
     kept: tuple[object, ...]
 
-    def __reduce_ex__(self, protocol: SupportsIndex) -> NoReturn:
-        raise TypeError(_STAYS)
 
-
-class _Bound(partial[None]):
-    """A call of a function of Python, as little to be copied."""
-
-    def __reduce_ex__(self, protocol: SupportsIndex) -> NoReturn:
-        raise TypeError(_STAYS)
+class _Bound(_Stays, partial[None]):
+    """A call of a function of Python."""
 
 
 def bound(run: Callable[[], None]) -> Callable[[], None]:
@@ -142,8 +142,7 @@ class CEntry(NamedTuple):
 
 def c_entry(point: Any, n_in: int, n_out: int) -> CEntry:
     """The functions that call `point`, machine code of a graph alone, see `llvm_ir.scalar_ir`."""
-    address = ctypes.cast(point, ctypes.c_void_p).value
-    code = llvm.host().compile(_C_ENTRY.format(point=address, n_in=n_in, n_out=n_out), (), 0)
+    code = llvm.host().compile(_C_ENTRY.format(point=_address(point), n_in=n_in, n_out=n_out), (), 0)
     entry = CEntry(code.function("function", FUNCTION), code.function("integrand", INTEGRAND))
     for function in entry:
         function.point = point

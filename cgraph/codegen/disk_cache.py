@@ -11,6 +11,8 @@ from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+
 from ..util.require import require_path
 
 FORMAT = "cgraph machine code, 1"  # part of every name: entries of another format are other entries
@@ -37,6 +39,15 @@ def cached_code(folder: Path, recipe: str, make: Callable[[], bytes]) -> bytes:
             if _read(path) is None:  # Windows replaces no file that another process has just written and reads
                 _warn(f" in {folder}: {error.strerror or error}")
     return content
+
+
+def cache_choice(cache: object) -> bool | str:
+    """True, False or the path of a folder, which holds in another folder and another process. Raises TypeError."""
+    if isinstance(cache, (bool, np.bool_)):
+        return bool(cache)
+    if isinstance(cache, (str, os.PathLike)) and os.fspath(cache):
+        return str(Path(cache).expanduser().absolute())
+    raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r:.60}")
 
 
 def cache_folder(choice: bool | str) -> Path | None:

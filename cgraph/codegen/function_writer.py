@@ -1,9 +1,78 @@
 """FunctionWriter: LLVM's text of a function with loops, over numbers or over vectors of a number for each lane."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from __future__ import annotations
 
-from .arithmetic import Arithmetic, words_of
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from typing import NamedTuple
+
+REGISTERS = 13  # values that fit in the registers of any processor at once, some registers left over
+
+
+class Arithmetic(NamedTuple):
+    """Liberties of the instructions of a function, and the numbers that they work on at once."""
+
+    flags: str = ""  # fast-math flags: none is strict IEEE
+    lanes: int = 1  # doubles in a vector
+    registers: int = REGISTERS  # values that are in registers at once
+    together: int = 1  # at most so many arguments go into one call of a vector function, where lanes is 1
+    alike: bool = False  # whether each lane has the bits of one point: libm's where a function has no company there
+
+    @property
+    def polynomials(self) -> bool:
+        """Whether vectors have sines, exponentials, .. from polynomials; strict IEEE has libm's bits everywhere."""
+        return bool(self.flags)
+
+    @property
+    def fuses(self) -> bool:
+        """Whether a product and its sum are one instruction: which ones is said, so that it is the same everywhere."""
+        return self.flags == "contract"
+
+    @property
+    def unfused(self) -> Arithmetic:
+        """The same, but that products are rounded by themselves, so that what cancels is 0."""
+        return self._replace(flags="nsz") if self.fuses else self
+
+    @property
+    def type(self) -> str:
+        """The type of a value."""
+        return "double" if self.lanes == 1 else f"<{self.lanes} x double>"
+
+    @property
+    def suffix(self) -> str:
+        """The type of a value in names of intrinsic functions."""
+        return "f64" if self.lanes == 1 else f"v{self.lanes}f64"
+
+    def number(self, value: float) -> str:
+        """The constant, to the last bit."""
+        return bits(value) if self.lanes == 1 else f"splat (double {bits(value)})"
+
+    def splat(self, name: str, value: str) -> list[str]:
+        """The vector `name` of equal numbers."""
+        t, same = self.type, f"<{self.lanes} x i32> zeroinitializer"
+        return [
+            f"  {name}.first = insertelement {t} poison, double {value}, i32 0",
+            f"  {name} = shufflevector {t} {name}.first, {t} poison, {same}",
+        ]
+
+
+def words_of(arithmetic: Arithmetic) -> dict[str, str]:
+    """Words that the column `llvm` of the operation table names."""
+    return {
+        "t": arithmetic.type,
+        "b": "i1" if arithmetic.lanes == 1 else f"<{arithmetic.lanes} x i1>",
+        "s": arithmetic.suffix,
+        "f": f"{arithmetic.flags} " if arithmetic.flags and not arithmetic.fuses else "",
+        "zero": arithmetic.number(0.0),
+        "one": arithmetic.number(1.0),
+        "minus": arithmetic.number(-1.0),
+    }
+
+
+def bits(value: float) -> str:
+    """A double in LLVM's language."""
+    return f"0x{struct.unpack('>Q', struct.pack('>d', value))[0]:016X}"
 
 
 class FunctionWriter:
@@ -34,9 +103,9 @@ class FunctionWriter:
         """Write an instruction without a value."""
         self.lines.append(f"  {instruction}")
 
-    def number(self, value: float) -> str:
-        """A constant number."""
-        return self.arithmetic.number(value)
+    def number(self, value: str | float) -> str:
+        """A constant number; a value's name as it is."""
+        return value if isinstance(value, str) else self.arithmetic.number(value)
 
     def room(self, count: int = 1, kind: str = "") -> str:
         """The address of memory of this call for so many numbers, or values of another kind."""
@@ -58,6 +127,10 @@ class FunctionWriter:
         """A number, or value of another kind, to an address."""
         self.line(f"store {kind or self.type} {value}, ptr {address}, align 8")
 
+    def copy_bytes(self, target: str, source: str, size: int) -> None:
+        """Copy so many bytes from one address to another."""
+        self.line(f"call void @llvm.memcpy.p0.p0.i64(ptr {target}, ptr {source}, i64 {size}, i1 false)")
+
     def change(self, address: str, change: str) -> None:
         """Add to an integer, with "add ..", or take from it, with "sub ..", in memory."""
         name, by = change.split()
@@ -67,19 +140,18 @@ class FunctionWriter:
         """An operation on integers, or their comparison, as "icmp slt"."""
         return self.value(f"{operation} i64 {a}, {b}")
 
-    def apply(self, operation: str, a: str, b: str) -> str:
-        """An operation on two numbers, such as "fadd"."""
-        flags = f"{self.arithmetic.flags} " if self.arithmetic.flags else ""
-        return self.value(f"{operation} {flags}{self.type} {a}, {b}")
+    def apply(self, operation: str, a: str | float, b: str | float, exact: bool = False) -> str:
+        """An operation on two numbers, such as "fadd"; exact: with no flag but "contract"."""
+        flags = [f"{flag} " for flag in self.arithmetic.flags.split() if flag == "contract" or not exact]
+        return self.value(f"{operation} {''.join(flags)}{self.type} {self.number(a)}, {self.number(b)}")
 
     def compare(self, relation: str, a: str, b: str | float) -> str:
         """Where two numbers are so, as "ogt", in every lane."""
-        return self.value(f"fcmp {relation} {self.type} {a}, {b if isinstance(b, str) else self.number(b)}")
+        return self.value(f"fcmp {relation} {self.type} {a}, {self.number(b)}")
 
     def choose(self, condition: str, a: str, b: str | float) -> str:
         """a, or b in the lanes where the condition does not hold."""
-        other = b if isinstance(b, str) else self.number(b)
-        return self.value(f"select {self.bits} {condition}, {self.type} {a}, {self.type} {other}")
+        return self.value(f"select {self.bits} {condition}, {self.type} {a}, {self.type} {self.number(b)}")
 
     def mask(self, condition: str) -> str:
         """A condition of lanes as an integer, a bit each."""
@@ -162,14 +234,9 @@ class FunctionWriter:
         self.fork(condition, label, end)
         self.block(label)
 
-    @contextmanager
-    def each_lane(self) -> Iterator[str]:
+    def each_lane(self) -> AbstractContextManager[str]:
         """The lines inside, for every lane."""
-        if self.lanes == 1:
-            yield "0"
-            return
-        with self.loop(0, self.lanes) as lane:
-            yield lane
+        return nullcontext("0") if self.lanes == 1 else self.loop(0, self.lanes)
 
     def double_at(self, base: str, index: str, lane: str) -> str:
         """The address of one lane of base[index]."""
@@ -180,8 +247,3 @@ class FunctionWriter:
     def function(self, head: str, result: str = "void") -> list[str]:
         """The whole definition."""
         return [f"define {head} {{", "start:", *self.scratch, *self.lines, f"  ret {result}", "}"]
-
-
-def copied_bytes(target: str, source: str, size: int) -> str:
-    """The instruction that copies so many bytes from one address to another."""
-    return f"call void @llvm.memcpy.p0.p0.i64(ptr {target}, ptr {source}, i64 {size}, i1 false)"

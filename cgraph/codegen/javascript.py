@@ -13,8 +13,7 @@ from ..util.require import require_graph
 from ..util.version import __version__
 from ..util.words import counted
 from ..writing.structure_hash import structure_hash
-from .explicit_method import Tableau, checked_methods, weighted_sum
-from .statements import statements
+from .statements import Tableau, checked_methods, statements, weighted_sum
 
 MATH = frozenset(  # functions of real numbers that JavaScript has (ECMAScript 2015), by the names of the C library
     """abs acos acosh asin asinh atan atan2 atanh cbrt ceil cos cosh exp expm1 floor hypot log log10 log1p log2 sin
@@ -94,9 +93,8 @@ def to_js(graph: Graph, methods: Mapping[str, Tableau] | None = None, *, time: s
     require_graph("to_js", graph)
     chosen = checked_methods(methods, graph, time)
     n_in, n_out = len(graph.inputs), len(graph.outputs)
-    places = {node: str(k) for k, node in enumerate(graph.inputs)}
-    results = [(str(k), node) for k, node in enumerate(graph.outputs.values())]
-    found = statements(graph.nodes, places, results, _number, _operation, "const")
+    places, results = ([str(k) for k in range(count)] for count in (n_in, n_out))
+    found = statements(graph, places, results, _number, _operation, "const")
     rows = [columns(op) for op in found.ops]
     helpers = [f"const {_function(op)} = {op.javascript};" for op in rows if op.own_javascript and not _formula(op)]
     body = [*found.direct, *[line for part in found.parts for line in part]]

@@ -81,17 +81,25 @@ class Host:
         nodes: of its graphs.  lanes: of its numbers.  looped: whether they are loops over vectors that wait for memory.
         """
         level = 0 if nodes > (QUICK // 3 if looped else QUICK) else 1 if nodes > SHORT and lanes == 1 else LEVEL
+        self.require(functions)
         with _lock:
-            self._find(functions)
             if cache is None:
                 return self._loaded(self._translated(text, level))
             recipe = f"{self._identity}\nlevel {level}\n{text}"
             return self._loaded(cached_code(cache, recipe, lambda: self._translated(text, level)))
 
     def require(self, functions: Iterable[str]) -> None:
-        """Raise MissingFunctionError unless the C library has them."""
+        """Raise MissingFunctionError unless LLVM finds them in the C library: it would end the process over one."""
+        find = self._binding.address_of_symbol
         with _lock:
-            self._find(functions)
+            if not all(map(find, functions)):
+                self._binding.load_library_permanently(ctypes.util.find_library("m") or "ucrtbase")
+            missing = [name for name in functions if not find(name)]
+        if missing:
+            raise MissingFunctionError(
+                f"the C library of this machine has no {', '.join(missing)}: as machine code the operation needs "
+                f"instructions, the column `llvm` of its row; backends 'python' and 'numpy' do without"
+            )
 
     def _translated(self, text: str, level: int) -> bytes:
         """An object file of the text. LLVM's own cache wants the text parsed even when it has the object."""
@@ -113,17 +121,6 @@ class Host:
 
     def _machine(self, level: int) -> TargetMachine:
         return self._target.create_target_machine(cpu=self._name, features=self._features, opt=level, jit=True)
-
-    def _find(self, functions: Iterable[str]) -> None:
-        """See that LLVM finds the functions: it would end the process over a missing one."""
-        find = self._binding.address_of_symbol
-        if not all(map(find, functions)):
-            self._binding.load_library_permanently(ctypes.util.find_library("m") or "ucrtbase")
-        if missing := [name for name in functions if not find(name)]:
-            raise MissingFunctionError(
-                f"the C library of this machine has no {', '.join(missing)}: as machine code the operation needs "
-                f"instructions, the column `llvm` of its row; backends 'python' and 'numpy' do without"
-            )
 
 
 def host() -> Host:

@@ -9,10 +9,8 @@ from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import OPS, columns
 from ..operations.texts import LLVM_ONE_OR_ZERO, LLVM_WHERE
-from .arithmetic import REGISTERS, Arithmetic, bits, words_of
-from .function_writer import FunctionWriter
-from .parts import STEPS, Parts
-from .schedule import Joined, Merged, joined_calls, products_of, schedule
+from .function_writer import REGISTERS, Arithmetic, FunctionWriter, bits, words_of
+from .schedule import STEPS, Joined, Merged, Parts, joined_calls, products_of, schedule
 from .vector_math import POLYNOMIAL, helpers
 from .vector_sums import Sums, Vectors, vector_sums
 
@@ -96,7 +94,9 @@ def write_graph(
     def address(base: str, value: str, row: int) -> list[str]:
         return [f"  {value} = getelementptr {places[base][row]}"]
 
-    code = instructions(graph, ir.arithmetic, address, name, **how)
+    of_inputs = set(places["x"])  # an output may lie where an input does
+    last = {row for row, place in enumerate(places["y"]) if place in of_inputs}
+    code = instructions(graph, ir.arithmetic, address, name, last=last, **how)
     if code.places:
         ir.scratch.append(f"  %w = alloca [{code.places} x {ir.type}], align 64")
     if len(code.parts) == 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import builtins
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,14 +18,12 @@ from ..operations.operation import LIBRARY, Op, columns
 from ..operations.table import OPS
 from ..operations.values import by_element
 
-_PLAIN = ("float", "inf", "np")
-
 
 class OnFloats:
     """A graph at one point: generated Python."""
 
     def __init__(self, graph: Graph) -> None:
-        self._graph, self.source = graph, source(graph, lambda op: op.python, {*OPS, *_PLAIN})
+        self._graph, self.source = graph, source(graph, lambda op: op.python)
         self._function = _executable(self.source, {name: op.raising for name, op in _rows(graph).items()})
 
     def __call__(self, x: Sequence[float]) -> tuple[float, ...]:
@@ -52,7 +50,7 @@ class OnArrays:
                 return f"{op.name}({', '.join([f'{{{slot}}}' for slot in range(op.arity)])})"
             return str(op.numpy)
 
-        self.source = source(graph, text, {*OPS, *_PLAIN})
+        self.source = source(graph, text)
         values = {name: by_element(op.scalar) if name in apart else op.array for name, op in rows.items()}
         self._function = _executable(self.source, values)
 
@@ -83,16 +81,15 @@ def _executable(text: str, operations: dict[str, Any]) -> Callable[[Any], tuple[
     return function
 
 
-def source(graph: Graph, text_of: Callable[[Op], str], helpers: Iterable[str]) -> str:
+def source(graph: Graph, text_of: Callable[[Op], str]) -> str:
     """Text of `def function(x)` from a sequence of inputs to a tuple of outputs.
 
     Identifiers are numbered, since names of people clash: with keywords, with functions, and with one another where
     Python takes two letters for one (it reads U+03D5 as U+03C6). Comments tell them.
 
     text_of: the text of an operation, with {0}, {1}, .. for its arguments.
-    helpers: names that the text must not use for anything else.
     """
-    names = _names(graph, helpers)
+    names = _names(graph)
     unpacked = ", ".join(names[node] for node in graph.inputs)
     lines = ["def function(x):"]
     if graph.inputs:
@@ -106,10 +103,10 @@ def source(graph: Graph, text_of: Callable[[Op], str], helpers: Iterable[str]) -
     return "\n".join(lines) + "\n"
 
 
-def _names(graph: Graph, helpers: Iterable[str]) -> dict[Node, str]:
+def _names(graph: Graph) -> dict[Node, str]:
     """An identifier for each input, x0 and so on, and operation, by its number in the listing, and constants' texts."""
     mark = ""
-    while any([re.fullmatch(f"[xv]{mark}[0-9]+", name) for name in helpers]):  # a row of the table may be called x0
+    while any([re.fullmatch(f"[xv]{mark}[0-9]+", name) for name in OPS]):  # a row of the table may be called x0
         mark += "_"
     names, number = {node: f"x{mark}{i}" for i, node in enumerate(graph.inputs)}, 0
     for node in graph.nodes:

@@ -8,8 +8,7 @@ equations of motion take sines and cosines of joint angles and hardly anything e
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from .arithmetic import Arithmetic
-from .function_writer import FunctionWriter
+from .function_writer import Arithmetic, FunctionWriter
 
 MAGIC = 6755399441055744.0  # 1.5 * 2**52: added to a small number, it leaves the nearest integer in the low bits
 LARGEST_ANGLE = 1e6
@@ -28,21 +27,9 @@ EXP = tuple(1.0 / f for f in (2, 6, 24, 120, 720, 5040, 40320, 362880, 3628800, 
 
 
 class _Vectors(FunctionWriter):
-    """Instructions on vectors. An argument is a value's name or a number for all lanes.
+    """Instructions on vectors. An argument is a value's name or a number for all lanes."""
 
-    Of the flags of the polynomials' own arithmetic, `exact` instructions keep only the leave to round a product and its
-    sum once.
-    """
-
-    def f(self, op: str, a: str | float, b: str | float, exact: bool = False) -> str:
-        """Arithmetic on doubles."""
-        flags = self.arithmetic.flags.split()
-        kept = " ".join([each for each in flags if each == "contract" or not exact])
-        return self.value(f"{op} {kept} {self.type} {self.of(a)}, {self.of(b)}")
-
-    def of(self, value: str | float) -> str:
-        """A value's name as it is; a number as the constant of all lanes."""
-        return value if isinstance(value, str) else self.number(value)
+    f = FunctionWriter.apply
 
     def n(self, op: str, a: str, b: str | int) -> str:
         """Arithmetic on integers, with a constant or another value."""

@@ -1,4 +1,4 @@
-"""The graph: named inputs to named outputs, and the nodes that the outputs reach."""
+"""The graph: named inputs to named outputs, and the nodes that the outputs reach; and what a notebook shows of it."""
 
 from __future__ import annotations
 
@@ -239,8 +239,7 @@ class Graph:
 
     def values(self, values: Mapping[str, Value]) -> dict[Node, Value]:
         """{node: its value} of all nodes. Takes and raises what `evaluate` does."""
-        found = Graph(self.inputs, {str(k): node for k, node in enumerate(self.nodes)}).evaluate(values)
-        return dict(zip(self.nodes, found.values(), strict=True))
+        return dict(zip(self.nodes, values_of(self.inputs, self.nodes, values), strict=True))
 
     def counts(self) -> Counts:
         """Nodes, edges, depth, width, and nodes by operation, tag and role."""
@@ -306,6 +305,42 @@ class Graph:
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
         return render_html("graph", self)
+
+
+def html(what: Node | Graph) -> str | None:
+    """The drawing of a graph, or the formula of a node, as HTML: what a notebook shows of it.
+
+    Parameters
+    ----------
+    what : Node or Graph
+        The node or the graph.
+
+    Returns
+    -------
+    str or None
+        The HTML; None if no package is installed that draws it (extra `viz`), or if it cannot draw.
+
+    Raises
+    ------
+    TypeError
+        For what is neither a node nor a graph.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> "<math" in cg.html(cg.sin(x))
+    True
+    """
+    if not isinstance(what, (Node, Graph)):
+        raise TypeError(f"html needs a node or a graph, got {type(what).__name__}: {what!r:.60}")
+    return render_html("graph" if isinstance(what, Graph) else "node", what)
+
+
+def values_of(inputs: Sequence[Node], nodes: Sequence[Node], values: Mapping[str, Value]) -> list[Value]:
+    """Values of nodes over some inputs, as `evaluate` has them."""
+    outputs = {str(k): node for k, node in enumerate(nodes)}
+    return list(Graph(inputs, outputs).evaluate(values).values()) if outputs else []
 
 
 def largest_first(counter: Counter[str]) -> dict[str, int]:

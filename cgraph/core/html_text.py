@@ -16,9 +16,7 @@ def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: s
 
     def line(cells: Sequence[str], kind: str) -> str:
         styles = [LEFT if i < texts else RIGHT for i in range(len(cells))]
-        inside = [
-            f'<{kind} style="{style}">{_escape(cell)}</{kind}>' for style, cell in zip(styles, cells, strict=True)
-        ]
+        inside = [f'<{kind} style="{styles[i]}">{_escape(cell)}</{kind}>' for i, cell in enumerate(cells)]
         return f"<tr>{''.join(inside)}</tr>"
 
     above = f'<caption style="{LEFT}">{_escape(title)}</caption>' if title else ""

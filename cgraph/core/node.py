@@ -173,13 +173,8 @@ class Node:
     __pow__, __rpow__ = _operators("pow")
     __lt__, __gt__ = _operators("less")
     __le__, __ge__ = _operators("less_equal")
-    __neg__, __abs__, __floor__, __ceil__ = map(_unary, ("neg", "abs", "floor", "ceil"))
-
-    def __round__(self) -> Node:
-        return apply(ROWS["round"], self)
-
-    def __pos__(self) -> Node:
-        return self
+    __neg__, __abs__, __floor__, __ceil__, __round__ = map(_unary, ("neg", "abs", "floor", "ceil", "round"))
+    __pos__ = __copy__
 
 
 class Leaf(Node):
@@ -286,6 +281,14 @@ def as_node(value: Scalar) -> Node:
     <node 1.0>
     """
     return value if isinstance(value, Node) else constant(value)
+
+
+def named_node(what: str, value: Scalar) -> Node:
+    """The node of a value, as of `as_node`; an error says what the value is."""
+    try:
+        return as_node(value)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{what}: {error}") from None
 
 
 def apply(op: Row, *args: Scalar) -> Node:

@@ -9,7 +9,7 @@ from .forward import ReachedNodes
 from .label import ADJOINT, UNLABELLED, Label
 from .node import Node, as_node
 from .scope import building
-from .traversal import topological
+from .traversal import descendants, topological
 
 
 def cotangents(
@@ -37,10 +37,7 @@ def cotangents(
     [<node variable y>, <node variable x>]
     """
     order = topological(seeds)
-    active = set(wrt)
-    for node in order:
-        if any([arg in active for arg in node.args]):
-            active.add(node)
+    active = descendants(order, wrt)
     bars = dict(seeds)
     reached = ReachedNodes(seeds if zero_wins else dict.fromkeys(seeds))
     # A constant carries no tags. What is made of a constant cotangent takes those of the uses that it came from.

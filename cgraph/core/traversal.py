@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from operator import attrgetter
 
 from .checks import GraphError
@@ -46,6 +46,15 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
                     break
                 node, rest = stack.pop()
     return order
+
+
+def descendants(nodes: Sequence[Node], sources: Iterable[Node]) -> set[Node]:
+    """The nodes, among `nodes` in topological order, that depend on `sources`; the sources included."""
+    reached = set(sources)
+    for node in nodes:
+        if node not in reached and any([arg in reached for arg in node.args]):
+            reached.add(node)
+    return reached
 
 
 def as_made(nodes: Iterable[Node]) -> list[Node]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeVar
 
 from ..core.checks import GraphError
+from ..core.evaluation import is_finite
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import SUM, columns
@@ -14,6 +15,7 @@ from ..util.words import listed, nearest
 from ..writing.source_lines import lines_text
 
 Name = str | Node
+Point = Mapping[str, float]
 Value = TypeVar("Value")
 LONGEST_TEXT = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
 DEEPEST_TEXT = 4  # most operations within one another in such a text
@@ -41,11 +43,8 @@ class Names:
     def __init__(self, graph: Graph, called: Mapping[str, str] | None = None) -> None:
         require_graph("Names", graph)
         self.graph = graph
-        self.number: dict[Node, int] = {}
+        self.number = {node: i for i, node in enumerate([node for node in graph.nodes if node.args], 1)}
         self.by_name: dict[str, list[Node]] = {}
-        for node in graph.nodes:
-            if node.args:
-                self.number[node] = len(self.number) + 1
         self.known = dict.fromkeys((*graph.inputs, *graph.nodes))
         for node in self.known:
             if node.name is not None:
@@ -194,6 +193,17 @@ class Names:
             text, strength = parts[0]
             return (f"-({text})" if strength <= _NEGATION or text.startswith("-") else f"-{text}"), _NEGATION
         return f"{node.op.name}({', '.join([text for text, _ in parts])})", _WHOLE
+
+
+def checked_point(names: Names, at: Point) -> dict[str, float]:
+    """The point as floats, by the graph's names.
+
+    Raises GraphError for a missing or unknown name, ValueError for what is not finite.
+    """
+    for name, value in require_mapping("at", at, "input: value").items():
+        if isinstance(value, bool) or not is_finite(value):
+            raise ValueError(f"at: input {name!r} must be a finite number, got {value!r:.60}")
+    return {name: float(value) for name, value in names.inputs_of("at", at, all_of_them=True).items()}
 
 
 def joined(words: Sequence[str], most: int = 6) -> str:

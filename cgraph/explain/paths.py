@@ -6,15 +6,7 @@ from operator import itemgetter
 
 from ..core.graph import Edge
 from ..core.node import Node
-
-
-def descendants(nodes: Sequence[Node], sources: Iterable[Node]) -> set[Node]:
-    """The nodes, among `nodes` in topological order, that depend on `sources`; the sources included."""
-    reached = set(sources)
-    for node in nodes:
-        if node not in reached and any([arg in reached for arg in node.args]):
-            reached.add(node)
-    return reached
+from ..core.traversal import descendants
 
 
 def ancestors(sinks: Iterable[Node], without: Collection[Node] = ()) -> set[Node]:
@@ -33,6 +25,12 @@ def between(nodes: Sequence[Node], sources: Iterable[Node], sinks: Iterable[Node
     """The nodes on any path from `sources` to `sinks`, in the order of `nodes`; empty when there is none."""
     on_path = descendants(nodes, sources) & ancestors(sinks)
     return [node for node in nodes if node in on_path]
+
+
+def edges_among(nodes: Collection[Node]) -> list[Edge]:
+    """The uses of nodes by one another, in their order."""
+    inside = set(nodes)
+    return [Edge(arg, node, slot) for node in nodes for slot, arg in enumerate(node.args) if arg in inside]
 
 
 def path_count(nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node) -> int:

@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..core.evaluation import real_number
-from ..core.graph import Edge, Graph
+from ..core.graph import Edge, Graph, values_of
 from ..core.html_text import html_lines
 from ..core.node import Node, constant
 from ..core.reverse import cotangents
 from ..util.json_type import Json, json_number
 from ..util.require import require_graph, require_mapping
 from .names import Name, Names, joined
-from .paths import between
+from .paths import between, edges_among
 
 SHOWN = 8  # inputs, and operations on the way, that the text has
 
@@ -167,31 +167,25 @@ def why_nan(
         sink = known.output(output, "output")
         sinks = {known.called(output): sink}
     nodes = list(dict.fromkeys([*graph.inputs, *graph.nodes]))
-    values = dict(zip(nodes, _values(graph, nodes, point), strict=True))
+    values = dict(zip(nodes, map(float, values_of(graph.inputs, nodes, point)), strict=True))
     for name, sink in sinks.items():
         if not math.isfinite(values[sink]):
-            origin, way = _origin(graph, values, sink, point)
-            return _found(known, values, known.shown(name), values[sink], origin, way, None, values[origin])
+            way = _way(graph, values, sink, point)
+            return _found(known, values, known.shown(name), values[sink], way, None, values[way[0]])
     sources = list(graph.inputs) if input is None else [known.one(input, "input")]
     for name, sink in sinks.items():
-        bars = _values(graph, cotangents({sink: constant(1.0)}, sources), point)
+        bars = map(float, values_of(graph.inputs, cotangents({sink: constant(1.0)}, sources), point))
         for source, bar in zip(sources, bars, strict=True):
             if not math.isfinite(bar):
                 what = f"d {known.shown(name)} / d {known.text(source)}"
-                return _partial(known, values, what, bar, source, sink, point)
+                if (found := _partial(graph, source, sink, point)) is not None:
+                    return _found(known, values, what, bar, *found)
+                return WhyNan(graph, what, bar, at={known.shown(name): value for name, value in point.items()})
     return WhyNan(graph)
 
 
-def _values(graph: Graph, nodes: Sequence[Node], point: Mapping[str, float]) -> list[float]:
-    """Values of nodes over the graph's inputs at a point that may be anything."""
-    found = Graph(graph.inputs, {str(i): node for i, node in enumerate(nodes)}).evaluate(point)
-    return [float(each) for each in found.values()]
-
-
-def _origin(
-    graph: Graph, values: Mapping[Node, float], sink: Node, point: Mapping[str, float]
-) -> tuple[Node, list[Node]]:
-    """The first node behind the sink, by values that are not finite, with none behind it; and the way from it.
+def _way(graph: Graph, values: Mapping[Node, float], sink: Node, point: Mapping[str, float]) -> list[Node]:
+    """The way to the sink, by values that are not finite, from the first node with none behind it.
 
     What an operation does not take, such as a branch of `where`, has the partial 0, and is not behind it.
     """
@@ -200,7 +194,7 @@ def _origin(
     while stack:
         node = stack.pop()
         bad = [slot for slot, arg in enumerate(node.args) if not math.isfinite(values[arg])]
-        slopes = _values(graph, [Edge(node.args[slot], node, slot).partial for slot in bad], point) if bad else []
+        slopes = values_of(graph.inputs, [Edge(node.args[slot], node, slot).partial for slot in bad], point)
         behind = [node.args[slot] for slot, slope in zip(bad, slopes, strict=True) if slope != 0.0]
         behind = behind or [node.args[slot] for slot in bad]  # 0 times NaN
         if not behind:
@@ -210,34 +204,25 @@ def _origin(
                 way[arg] = node
                 stack.append(arg)
     order = {node: i for i, node in enumerate(graph.nodes)}
-    origin = min(ends, key=lambda node: order.get(node, -1))
-    steps = [origin]
+    steps = [min(ends, key=lambda node: order.get(node, -1))]
     while (after := way[steps[-1]]) is not None:
         steps.append(after)
-    return origin, steps
+    return steps
 
 
 def _partial(
-    names: Names,
-    values: Mapping[Node, float],
-    what: str,
-    bar: float,
-    source: Node,
-    sink: Node,
-    point: Mapping[str, float],
-) -> WhyNan:
-    """The first operation between the two that has a partial that is not finite."""
-    nodes = between(names.graph.nodes, [source], [sink])
-    inside = set(nodes)
-    edges = [Edge(arg, node, slot) for node in nodes for slot, arg in enumerate(node.args) if arg in inside]
-    slopes = _values(names.graph, [edge.partial for edge in edges], point)
+    graph: Graph, source: Node, sink: Node, point: Mapping[str, float]
+) -> tuple[list[Node], int, float] | None:
+    """The way from the first operation between the two with a partial that is not finite, by which argument, and it."""
+    edges = edges_among(between(graph.nodes, [source], [sink]))
+    slopes = map(float, values_of(graph.inputs, [edge.partial for edge in edges], point))
     for edge, slope in zip(edges, slopes, strict=True):
         if not math.isfinite(slope):
             way = [edge.target]
             while way[-1] is not sink:
                 way.append(next(each.target for each in edges if each.source is way[-1]))
-            return _found(names, values, what, bar, edge.target, way, edge.slot, slope)
-    return WhyNan(names.graph, what, bar, at={names.shown(name): value for name, value in point.items()})
+            return way, edge.slot, slope
+    return None
 
 
 def _found(
@@ -245,14 +230,13 @@ def _found(
     values: Mapping[Node, float],
     what: str,
     value: float,
-    node: Node,
     way: Sequence[Node],
     slot: int | None,
     result: float,
 ) -> WhyNan:
+    node = way[0]
     behind = set(between(names.graph.nodes, names.graph.inputs, [node])) if node.args else set()
-    name = what.partition(" / ")[0].removeprefix("d ")
-    steps = [*[names.short(each) for each in way], name]
+    steps = [*[names.short(each) for each in way], what.partition(" / ")[0].removeprefix("d ")]
     return WhyNan(
         names.graph,
         what,

@@ -60,11 +60,7 @@ def rule_of(node: Node) -> tuple[Callable[..., Interval], Sequence[Node]]:
     op = columns(node.op)
     if op.interval_of_same is not None and node.args[0] is node.args[1]:
         return op.interval_of_same, node.args[:1]
-    return op.interval or _unknown, node.args
-
-
-def _unknown(*_: Interval) -> Interval:
-    return REAL_LINE
+    return op.interval or (lambda *_: REAL_LINE), node.args
 
 
 def _of(name: str, *args: Any) -> Any:
@@ -230,11 +226,6 @@ def always(value: float) -> Callable[[Interval], Interval]:
 # Where a slope is unbounded or is none, in words that follow "the slope of sqrt is".
 
 
-def no_tangent(a: Interval) -> str | None:
-    """The poles of the tangent."""
-    return "value and slope are infinite at odd multiples of pi/2" if tan(a) == REAL_LINE else None
-
-
 def below(limit: float, there: str) -> Callable[[Interval], str | None]:
     """Rule of a domain that begins at `limit`."""
 
@@ -244,11 +235,6 @@ def below(limit: float, there: str) -> Callable[[Interval], str | None]:
         return f"{there} at {limit:g}" if a[0] == limit else None
 
     return singular
-
-
-def steep(words: str) -> Callable[[Interval], str | None]:
-    """Rule of a function whose slope is infinite at 0."""
-    return lambda a: words if a[0] <= 0.0 <= a[1] else None
 
 
 def arc(a: Interval) -> str | None:

@@ -10,15 +10,13 @@ from collections.abc import Callable
 from ..core.node import Node, apply, constant
 from .operation import OPS
 
-_SUMS = ("add", "sub")
-
 
 def add(a: Node, b: Node) -> Node | None:
     """a + b: a zero goes, constants and twice the same are joined, a sign makes it a difference."""
     if b.value is not None:
         a, b = b, a
     if a.value is not None:
-        return b if a.value == 0.0 else _offset(a.value, b)
+        return b if a.value == 0.0 else _offset("add", a.value, b)
     if b.op.name == "neg":
         return a - b.args[0]
     if a.op.name == "neg":
@@ -33,11 +31,12 @@ def _doubled(name: str, a: Node, b: Node) -> Node | None:
     return None
 
 
-def _offset(c: float, b: Node) -> Node | None:
-    """c + b where b has a constant of its own to join with: c + (d + x), c + (d - x)."""
-    if b.op.name in _SUMS and (d := b.args[0].value) is not None and math.isfinite(c + d):
-        return constant(c + d) + b.args[1] if b.op.name == "add" else constant(c + d) - b.args[1]
-    return None
+def _offset(name: str, c: float, b: Node) -> Node | None:
+    """c + b or c - b where b has a constant of its own to join with: c + (d + x), c - (d - x)."""
+    if b.op.name not in ("add", "sub") or (d := b.args[0].value) is None:
+        return None
+    total = OPS[name].scalar(c, d)
+    return apply(OPS["add" if b.op.name == name else "sub"], total, b.args[1]) if math.isfinite(total) else None
 
 
 def sub(a: Node, b: Node) -> Node | None:
@@ -46,8 +45,8 @@ def sub(a: Node, b: Node) -> Node | None:
         return -b
     if b.value is not None:
         return constant(-b.value) + a
-    if a.value is not None and b.op.name in _SUMS and (d := b.args[0].value) is not None and math.isfinite(a.value - d):
-        return constant(a.value - d) - b.args[1] if b.op.name == "add" else constant(a.value - d) + b.args[1]
+    if a.value is not None and (joined := _offset("sub", a.value, b)) is not None:
+        return joined
     if a is b:
         return constant(0.0)
     if b.op.name == "neg":

@@ -9,7 +9,7 @@ from itertools import pairwise
 from ..core.builder import Builder
 from ..core.evaluation import real_array
 from ..core.label import SMOOTH, label
-from ..core.node import Node, Scalar, as_node
+from ..core.node import Node, Scalar, as_node, named_node
 from ..core.scope import building, current
 from ..util.require import require_choice, require_sequence
 from .operation import OPS
@@ -70,7 +70,7 @@ def interp(
     """
     require_choice("kind of interp", kind, tuple(_SLOPES))
     require_choice("outside of interp", outside, ("constant", "linear"))
-    at, knots = _named("x of interp", x), _knots(xs)
+    at, knots = named_node("x of interp", x), _knots(xs)
     with building(Builder()):  # which computes what is constant
         pieces = _pieces(knots, _values(ys, len(knots)), _SLOPES[kind], straight=outside == "linear")
     if any([each.value is not None and not math.isfinite(each.value) for piece in pieces for each in piece]):
@@ -86,14 +86,6 @@ def interp(
     return value
 
 
-def _named(what: str, value: Scalar) -> Node:
-    """The node of a value; an error says whose it is."""
-    try:
-        return as_node(value)
-    except (TypeError, ValueError) as error:
-        raise type(error)(f"{what}: {error}") from None
-
-
 def _knots(xs: Sequence[float]) -> list[float]:
     array = real_array("xs of interp", xs)
     if array.ndim != 1 or len(array) < 2:
@@ -101,17 +93,15 @@ def _knots(xs: Sequence[float]) -> list[float]:
     knots: list[float] = array.tolist()
     if bad := [k for k, knot in enumerate(knots) if not math.isfinite(knot)]:
         raise ValueError(f"xs of interp must be finite, got xs[{bad[0]}] = {knots[bad[0]]!r}")
-    if bad := [k for k in range(1, len(knots)) if not knots[k - 1] < knots[k]]:
-        k = bad[0]
-        raise ValueError(
-            f"xs of interp must increase strictly, got xs[{k - 1}] = {knots[k - 1]!r} and xs[{k}] = {knots[k]!r}"
-        )
+    for k, (a, b) in enumerate(pairwise(knots)):
+        if not a < b:
+            raise ValueError(f"xs of interp must increase strictly, got xs[{k}] = {a!r} and xs[{k + 1}] = {b!r}")
     return knots
 
 
 def _values(ys: Sequence[Scalar], n: int) -> list[Node]:
     values = require_sequence("ys of interp", ys, "numbers or nodes")
-    nodes = [_named(f"ys[{k}] of interp", each) for k, each in enumerate(values)]
+    nodes = [named_node(f"ys[{k}] of interp", each) for k, each in enumerate(values)]
     if len(nodes) != n:
         raise ValueError(f"ys of interp must have a value for each of the {n} knots, got {len(nodes)}")
     if bad := [k for k, node in enumerate(nodes) if node.value is not None and not math.isfinite(node.value)]:
@@ -129,23 +119,15 @@ def _pieces(
     h = [after - before for before, after in pairwise(x)]
     rise = [(after - before) / step for before, after, step in zip(y, y[1:], h, strict=False)]
     zero = as_node(0.0)
-    if slopes_of is None:
-        first, last = rise[0], rise[-1]
-        inside = [[*each] for each in zip(y, rise, strict=False)]
-    else:
-        d = slopes_of(h, rise)
-        first, last = d[0], d[-1]
+    d = rise if slopes_of is None else slopes_of(h, rise)
+    inside = [[*each] for each in zip(y, rise, strict=False)]
+    if slopes_of is not None:
         inside = [  # Hermite's cubic of values and slopes at both ends
-            [
-                y[i],
-                d[i],
-                (3.0 * rise[i] - 2.0 * d[i] - d[i + 1]) / h[i],
-                (d[i] + d[i + 1] - 2.0 * rise[i]) / h[i] / h[i],
-            ]
-            for i in range(len(h))
+            [value, a, (3.0 * each - 2.0 * a - b) / step, (a + b - 2.0 * each) / step / step]
+            for value, a, b, each, step in zip(y, d, d[1:], rise, h, strict=False)
         ]
     more = [zero] * (len(inside[0]) - 2)
-    before, after = [[value, slope if straight else zero, *more] for value, slope in ((y[0], first), (y[-1], last))]
+    before, after = [[value, slope if straight else zero, *more] for value, slope in ((y[0], d[0]), (y[-1], d[-1]))]
     return [before, *inside, after]
 
 

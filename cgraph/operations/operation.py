@@ -1,7 +1,8 @@
-"""Op: one row of the operation table, all that any part of the library knows of an operation; and `register`."""
+"""Op: one row of the operation table, all that any part of the library knows of an operation; and its function."""
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,16 +11,46 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.node import CONSTANT, VARIABLE, Node, apply
+from ..core.node import CONSTANT, VARIABLE, Node, Scalar, apply, named_node
 from ..core.row import BY_UFUNC, ROWS, Row
+from ..util.caches import kept_by_first
 from .values import ieee
 
 Interval = tuple[float, float]
+Function = Callable[..., Node]
 
 # How strongly a text binds: in parentheses goes what binds less than its place asks for.
 RELATION, SUM, PRODUCT, FUNCTION, LEAF = range(5)
 LIBRARY = 2.0  # units of rounding: libraries promise an ulp or so
 _IN_BROWSER = "Math.{} ?? (() => NaN)"
+_HELP = """\
+{about}
+
+Parameters
+----------
+{parameters} : Node or float
+    Nodes, or numbers, which become constants.
+
+Returns
+-------
+Node
+    The node {name}({parameters}). Where the operation has no value, that of the node is NaN or infinite.
+
+Raises
+------
+TypeError
+    When an argument is neither a node nor a real number.
+ValueError
+    When an argument is NaN.
+
+Examples
+--------
+>>> import cgraph as cg
+>>> inputs = cg.variables("{names}")
+>>> graph = cg.Graph(inputs, {{"result": cg.{name}(*inputs)}})
+>>> round(graph.evaluate({values})["result"], 6)
+{result!r}
+"""
 
 
 class MathML(NamedTuple):
@@ -230,12 +261,56 @@ def enter(op: Op) -> None:
     if before is not None and BY_UFUNC.get(before.ufunc or "") is before:
         del BY_UFUNC[before.ufunc or ""]
     OPS[op.name] = ROWS[op.name] = op
-    if op.ufunc is not None:
-        BY_UFUNC[op.ufunc] = op
-        if isinstance(op.ufunc, np.ufunc) and not hasattr(Node, op.ufunc.__name__):
-            setattr(Node, op.ufunc.__name__, _method_of(op.ufunc))
+    if (ufunc := op.ufunc) is not None:
+        BY_UFUNC[ufunc] = op
+        if isinstance(ufunc, np.ufunc) and not hasattr(Node, ufunc.__name__):
+            # The method that NumPy asks of the elements of an array of objects, as in `np.sqrt(array)`.
+            setattr(Node, ufunc.__name__, lambda *nodes: apply(BY_UFUNC[ufunc], *nodes))
 
 
-def _method_of(ufunc: np.ufunc) -> Callable[..., Node]:
-    """The method that NumPy asks of the elements of an array of objects, as in `np.sqrt(array)`."""
-    return lambda *nodes: apply(BY_UFUNC[ufunc], *nodes)
+def function(op: Op) -> Function:
+    """The function that makes nodes of an operation."""
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    signature = inspect.Signature([inspect.Parameter(name, kind) for name in op.parameters])
+
+    def make(*args: Scalar, **named: Scalar) -> Node:
+        if named:
+            try:
+                args = signature.bind(*args, **named).args
+            except TypeError as error:
+                raise TypeError(f"{op.name}{signature}: {error}") from None
+        try:
+            return apply(op, *args)
+        except (TypeError, ValueError):
+            for name, value in zip(op.parameters, args, strict=False):
+                named_node(f"{name} of {op.name}", value)
+            raise
+
+    make.__name__ = make.__qualname__ = op.name
+    make.__doc__ = _help(op)
+    make.__signature__ = signature  # type: ignore[attr-defined]
+    return make
+
+
+def of_name(name: str) -> Function:
+    """The function of the row of that name: `cg.asinh` of a row "asinh" that was added to the table."""
+    if name not in OPS:
+        raise AttributeError(f"module 'cgraph' has no attribute {name!r}")
+    return _of_row(OPS[name])
+
+
+_of_row = kept_by_first(function)
+
+
+def _help(op: Op) -> str:
+    if not op.samples:
+        return op.about
+    sample = op.samples[0]
+    return _HELP.format(
+        about=op.about,
+        parameters=", ".join(op.parameters),
+        name=op.name,
+        names=" ".join(op.parameters),
+        values="{" + ", ".join(f'"{name}": {x}' for name, x in zip(op.parameters, sample, strict=True)) + "}",
+        result=round(op.scalar(*sample), 6),
+    )

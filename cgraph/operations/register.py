@@ -80,7 +80,7 @@ def register(op: Op, *, replace: bool = False) -> None:
         _filled(op, "llvm", line, (), _LLVM)
     OPS[op.name] = op  # partials may have nodes of the operation itself
     try:
-        forms = [_partials(op), *_quotient(op)]
+        forms = _slopes(op)
         for sample in op.samples:
             for partials in forms:
                 _check_columns(op, partials, sample)
@@ -94,23 +94,19 @@ def register(op: Op, *, replace: bool = False) -> None:
     enter(op)
 
 
-def _partials(op: Op) -> Graph:
-    """The partials, one for each argument, as a graph."""
+def _slopes(op: Op) -> list[Graph]:
+    """The partials, one for each argument, as a graph; and those by the column `quotient`, if it gives some."""
     args = tuple([variable(name) for name in op.parameters])
-    partials = op.partials(Node(op, args), *args)
+    y = Node(op, args)
+    partials = op.partials(y, *args)
     if not isinstance(partials, tuple):
         raise TypeError(f"operation {op.name!r}: partials must give a tuple, got {partials!r:.60}")
     if len(partials) != op.arity:
         raise ValueError(f"operation {op.name!r} takes {op.arity} argument(s), its partials are {len(partials)}")
-    return Graph(args, dict(zip(op.parameters, partials, strict=True)))
-
-
-def _quotient(op: Op) -> list[Graph]:
-    """The partials by the column `quotient`, if it gives some."""
-    args = tuple([variable(name) for name in op.parameters])
-    if op.quotient is None or (form := op.quotient(Node(op, args), *args)) is None:
-        return []
-    return [Graph(args, {name: as_node(each) / form[0] for name, each in zip(op.parameters, form[1], strict=True)})]
+    forms = [partials]
+    if op.quotient is not None and (form := op.quotient(y, *args)) is not None:
+        forms.append(tuple([as_node(each) / form[0] for each in form[1]]))
+    return [Graph(args, dict(zip(op.parameters, form, strict=True))) for form in forms]
 
 
 def _check_columns(op: Op, partials: Graph, sample: tuple[float, ...]) -> None:
@@ -152,9 +148,8 @@ def _check_columns(op: Op, partials: Graph, sample: tuple[float, ...]) -> None:
 
 def _filled(op: Op, column: str, text: str, args: Sequence[str], words: Mapping[str, str]) -> str:
     """A column's text with arguments in their places."""
-    args = args or [f"a{slot}" for slot in range(op.arity)]
     try:
-        return text.format(*args, **words)
+        return text.format(*(args or [f"a{slot}" for slot in range(op.arity)]), **words)
     except (LookupError, ValueError):
         places = ", ".join([f"{{{each}}}" for each in (*range(op.arity), *words)])
         raise ValueError(f"operation {op.name!r}: {column} has the places {places}, got {text!r:.80}") from None
@@ -203,9 +198,8 @@ def _check_interval(op: Op) -> None:
 
 
 def _where(op: Op, at: tuple[float, ...]) -> str:
-    return (
-        f"operation {op.name!r}: at {', '.join([f'{x}={value:g}' for x, value in zip(op.parameters, at, strict=True)])}"
-    )
+    point = ", ".join([f"{x}={value:g}" for x, value in zip(op.parameters, at, strict=True)])
+    return f"operation {op.name!r}: at {point}"
 
 
 def _scalar(op: Op, at: tuple[float, ...]) -> float:

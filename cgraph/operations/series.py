@@ -8,13 +8,14 @@ rule, piecewise operations their `piece`; every other operation without a rule o
 """
 
 import operator
-from typing import Protocol
+from typing import Literal, Protocol
 
 from ..core.node import Node, apply, as_node
 from .operation import OPS
 from .values import whole_power
 
 POWERS = 2.0**53  # whole exponents up to this size become products
+Kind = Literal["plain", "weighted", "safe"]  # of a sum over orders
 
 
 class Orders(Protocol):
@@ -28,14 +29,8 @@ class Orders(Protocol):
     def at(self, node: Node) -> Node | None:
         """Coefficient k; None of what is constant."""
 
-    def sum(self, a: Node, b: Node) -> Node:
-        """The sum over 0 < j < k of a_j b_k-j."""
-
-    def weighted_sum(self, a: Node, b: Node) -> Node:
-        """The sum over 0 < j < k of j a_j b_k-j."""
-
-    def safe_sum(self, a: Node, b: Node) -> Node:
-        """The sum over 0 < j < k of a_j b_k-j, in which zeros win over what is not finite."""
+    def sum(self, a: Node, b: Node, kind: Kind = "plain") -> Node:
+        """The sum over 0 < j < k of a_j b_k-j; "weighted" of j a_j b_k-j; "safe": zeros win over what is not finite."""
 
 
 def mul(orders: Orders, y: Node, a: Node, b: Node) -> Node:
@@ -49,7 +44,7 @@ def mul(orders: Orders, y: Node, a: Node, b: Node) -> Node:
 def zero_safe_mul(orders: Orders, y: Node, a: Node, b: Node) -> Node:
     """y = a * b, in which a zero coefficient wins over an infinite one."""
     terms = [apply(OPS["zero_safe_mul"], orders.zero(x), each) for x, each in _crossed(orders, a, b)]
-    return terms[0] if len(terms) == 1 else terms[0] + terms[1] + orders.safe_sum(a, b)
+    return terms[0] if len(terms) == 1 else terms[0] + terms[1] + orders.sum(a, b, "safe")
 
 
 def _crossed(orders: Orders, a: Node, b: Node) -> list[tuple[Node, Node]]:
@@ -85,7 +80,7 @@ def pow(orders: Orders, y: Node, a: Node, b: Node) -> Node | None:
     """y = a ** b with a constant b: ydot a = b y adot. A whole b is products, which have series at a = 0, too."""
     if orders.at(b) is not None or (b.value is not None and b.value.is_integer()):
         return orders.at(power(a, b))
-    inner = (orders.zero(b) * orders.weighted_sum(a, y) - orders.weighted_sum(y, a)) / orders.k
+    inner = (orders.zero(b) * orders.sum(a, y, "weighted") - orders.sum(y, a, "weighted")) / orders.k
     return inner * orders.zero(1.0 / a) + orders.zero(b * a ** (b - 1.0)) * _moving(orders.at(a))
 
 
@@ -99,7 +94,7 @@ def by_partials(orders: Orders, y: Node, *args: Node) -> Node:
         if (each := orders.at(arg)) is not None:
             terms.append(orders.zero(partial) * each)
             if partial.value is None:
-                terms.append(orders.weighted_sum(arg, partial) / orders.k)
+                terms.append(orders.sum(arg, partial, "weighted") / orders.k)
     return sum(terms[1:], terms[0])
 
 

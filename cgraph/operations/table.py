@@ -9,8 +9,7 @@ import numpy as np
 
 from ..core.node import Node, constant
 from . import bounds, folding, series, texts, values
-from .functions import Function, function
-from .operation import FUNCTION, OPS as OPS, PRODUCT, RELATION, SUM, MathML, Op, enter  # noqa: PLC0414
+from .operation import FUNCTION, OPS as OPS, PRODUCT, RELATION, SUM, Function, MathML, Op, enter, function  # noqa: PLC0414
 from .values import ieee
 
 
@@ -90,10 +89,12 @@ _INF = math.inf
 _SMALLEST_NORMAL = 2.0**-1022  # what is smaller counts as 0 in some processes
 _WRITTEN_OUT, _MOST_PARTS = ("add", "sub", "neg", "mul", "div", "abs", "minimum", "maximum"), 32
 
+
 # By place: name, arity, value on floats, value on arrays, partials of (output y, arguments), samples. The rest by name.
-# A table is read by columns, so the formatter leaves it alone.
+# A table is read by columns, so the formatter leaves it alone. In a function, for it names those that are made of it below.
 # fmt: off
-ROWS = (
+def _rows() -> tuple[Op, ...]:
+    return (
     Op("add", 2, operator.add, np.add, lambda y, a, b: (1.0, 1.0), ((0.3, -0.7),), about="The sum a + b.",
        symbol="+", infix=("+", SUM), mathml=MathML("{0}<mo>+</mo>{1}", (SUM, PRODUCT), SUM), commutative=True, signs=(1, 1),
        fold=folding.add, operator=operator.add, domain=(_REAL, _REAL),
@@ -110,8 +111,8 @@ ROWS = (
        interval=bounds.mul, interval_of_same=bounds.square, rounding=1.0,
        python="{} * {}", numpy="{} * {}", llvm=texts.llvm_arithmetic("fmul"), c="{0} * {1}", javascript="(a, b) => a * b"),
     # A product in which an exact zero wins over infinity and NaN: what the chain rule needs behind a branch not taken.
-    Op("zero_safe_mul", 2, lambda a, b: a * b if a and b else 0.0, values.zero_safe_mul_arrays, lambda y, a, b: (b, a),
-       ((0.3, -0.7), (2.0, 1.5)), about="The product a * b, and 0 where a or b is 0, even if the other is infinite or NaN.",
+    Op("zero_safe_mul", 2, lambda a, b: a * b if a and b else 0.0, lambda a, b: np.where((a == 0) | (b == 0), 0.0, np.multiply(a, b)),
+       lambda y, a, b: (b, a), ((0.3, -0.7), (2.0, 1.5)), about="The product a * b, and 0 where a or b is 0, even if the other is infinite or NaN.",
        symbol="⊗", infix=("*", PRODUCT), mathml=MathML("{0}<mo>·</mo>{1}", (PRODUCT, PRODUCT), PRODUCT),
        commutative=True, selects=True, fold=folding.zero_safe_mul,
        series=series.zero_safe_mul, precise=lambda a, b: a if a == 0 else b if b == 0 else a * b, domain=(_REAL, _REAL),
@@ -167,7 +168,7 @@ ROWS = (
     Op("cbrt", 1, math.cbrt, np.cbrt, lambda y, a: (1.0 / (3.0 * y * y),), ((0.6,), (-2.0,)), about="The real cube root of x.",
        symbol="∛", mathml=MathML("<mroot><mrow>{0}</mrow><mn>3</mn></mroot>", (0,), FUNCTION), domain=(_POSITIVE,),
        fold=lambda a: -cbrt(a.args[0]) if a.op.name == "neg" else None, interval=bounds.rising("cbrt"),
-       singular=bounds.steep("the slope is infinite at 0"), precise=values.precise_cbrt),
+       singular=lambda a: "the slope is infinite at 0" if a[0] <= 0.0 <= a[1] else None, precise=values.precise_cbrt),
     Op("logistic", 1, values.logistic, values.logistic_arrays, lambda y, a: (y * logistic(-a),), ((0.3,), (-1.2,)),
        about="The logistic function 1 / (1 + exp(-x)), without overflow on the way.", ufunc="expit", domain=(_REAL,),
        interval=bounds.rising("logistic"), rounding=4.0,
@@ -182,7 +183,9 @@ ROWS = (
        about="1 - erf(x), exact for large x too.", domain=((-2.5, 5.0),),
        interval=bounds.rising("erfc", falling=True), javascript=texts.JAVASCRIPT_ERFC),
     Op("tan", 1, math.tan, np.tan, lambda y, a: (1.0 + y * y,), ((0.3,),), about="The tangent of x, in radians.",
-       domain=((-1.2, 1.2),), interval=bounds.tan, singular=bounds.no_tangent, quotient=lambda y, a: (1.0, (1.0 + y * y,))),
+       domain=((-1.2, 1.2),), interval=bounds.tan,
+       singular=lambda a: "value and slope are infinite at odd multiples of pi/2" if bounds.tan(a) == bounds.REAL_LINE else None,
+       quotient=lambda y, a: (1.0, (1.0 + y * y,))),
     Op("asin", 1, math.asin, np.arcsin, lambda y, a: (1.0 / sqrt((1.0 - a) * (1.0 + a)),), ((0.3,),), domain=(_UNIT,),
        about="The angle between -pi/2 and pi/2 whose sine is x, in radians.",
        interval=bounds.rising("asin", (-1.0, 1.0)), singular=bounds.arc),
@@ -225,17 +228,18 @@ ROWS = (
        about="The remainder of a / b with the sign of a: a - b * trunc(a / b), exactly.", domain=(_REAL, _POSITIVE),
        jumps=lambda a, b: a / b, interval=bounds.fmod, interval_of_same=bounds.always(0.0),
        singular=bounds.divisor, rounding=0.0, javascript="(a, b) => a % b"),
-    Op("sign", 1, values.sign, np.sign, _flat, ((0.3,), (-0.7,)), about="-1, 0 or 1: the sign of x.", domain=(_REAL,),
+    Op("sign", 1, lambda a: a if a != a else float(a > 0) - float(a < 0), np.sign, _flat, ((0.3,), (-0.7,)), about="-1, 0 or 1: the sign of x.", domain=(_REAL,),
        piece=lambda side: (None, side), interval=bounds.rising("sign"),
        rounding=0.0, llvm=texts.LLVM_SIGN, c="{0} > 0.0 ? 1.0 : ({0} < 0.0 ? -1.0 : ({0} != {0} ? {0} : 0.0))",
        javascript="(a) => (a !== a ? a : (a > 0) - (a < 0))"),
-    Op("minimum", 2, lambda a, b: a if a <= b or a != a else b, values.minimum_arrays,
+    # Of two zeros the first, where np.minimum and np.maximum take either.
+    Op("minimum", 2, lambda a, b: a if a <= b or a != a else b, lambda a, b: np.where((a <= b) | (a != a), a, b),
        lambda y, a, b: ((first := _above(b, a)), where(first, 0.0, 1.0)), ((0.3, -0.7), (-0.7, 0.3)), about="The smaller of a and b.",
        symbol="min", ufunc=np.minimum, commutative=True, selects=True, fold=folding.same,
        piece=lambda side: (int(side > 0), 1), domain=(_REAL, _REAL), interval=bounds.minimum, rounding=0.0,
        llvm=texts.LLVM_MINIMUM, c="({0} <= {1} || {0} != {0}) ? {0} : {1}",
        javascript="(a, b) => (a <= b || a !== a ? a : b)"),
-    Op("maximum", 2, lambda a, b: a if a >= b or a != a else b, values.maximum_arrays,
+    Op("maximum", 2, lambda a, b: a if a >= b or a != a else b, lambda a, b: np.where((a >= b) | (a != a), a, b),
        lambda y, a, b: ((first := _above(a, b)), where(first, 0.0, 1.0)), ((0.3, -0.7), (-0.7, 0.3)), about="The larger of a and b.",
        symbol="max", ufunc=np.maximum, commutative=True, selects=True, fold=folding.same,
        piece=lambda side: (int(side < 0), 1), domain=(_REAL, _REAL), interval=bounds.maximum, rounding=0.0,
@@ -275,45 +279,21 @@ ROWS = (
 )
 # fmt: on
 
+ROWS = _rows()
 for _row in ROWS:
     enter(_row)
 FLAT = {row.name for row in ROWS if row.partials is _flat}
 
-sqrt: Function = function(OPS["sqrt"])
-exp: Function = function(OPS["exp"])
-expm1: Function = function(OPS["expm1"])
-log: Function = function(OPS["log"])
-log1p: Function = function(OPS["log1p"])
-log2: Function = function(OPS["log2"])
-log10: Function = function(OPS["log10"])
-exp2: Function = function(OPS["exp2"])
-cbrt: Function = function(OPS["cbrt"])
-logistic: Function = function(OPS["logistic"])
-erf: Function = function(OPS["erf"])
-erfc: Function = function(OPS["erfc"])
-sin: Function = function(OPS["sin"])
-cos: Function = function(OPS["cos"])
-tan: Function = function(OPS["tan"])
-asin: Function = function(OPS["asin"])
-acos: Function = function(OPS["acos"])
-atan: Function = function(OPS["atan"])
-sinh: Function = function(OPS["sinh"])
-cosh: Function = function(OPS["cosh"])
-tanh: Function = function(OPS["tanh"])
-abs_: Function = function(OPS["abs"])
-floor: Function = function(OPS["floor"])
-ceil: Function = function(OPS["ceil"])
-round_: Function = function(OPS["round"])
-fmod: Function = function(OPS["fmod"])
-sign: Function = function(OPS["sign"])
-pow: Function = function(OPS["pow"])
-atan2: Function = function(OPS["atan2"])
-hypot: Function = function(OPS["hypot"])
-minimum: Function = function(OPS["minimum"])
-maximum: Function = function(OPS["maximum"])
-less: Function = function(OPS["less"])
-less_equal: Function = function(OPS["less_equal"])
-equal: Function = function(OPS["equal"])
-not_equal: Function = function(OPS["not_equal"])
-where: Function = function(OPS["where"])
-zero_safe_mul: Function = function(OPS["zero_safe_mul"])
+
+def _functions(names: str) -> list[Function]:
+    """The functions of these rows."""
+    return [function(OPS[name]) for name in names.split()]
+
+
+sqrt, cbrt, pow, hypot, zero_safe_mul = _functions("sqrt cbrt pow hypot zero_safe_mul")
+exp, exp2, expm1, log, log2, log10, log1p = _functions("exp exp2 expm1 log log2 log10 log1p")
+sin, cos, tan, asin, acos, atan, atan2 = _functions("sin cos tan asin acos atan atan2")
+sinh, cosh, tanh, logistic, erf, erfc = _functions("sinh cosh tanh logistic erf erfc")
+abs_, sign, floor, ceil, round_, fmod = _functions("abs sign floor ceil round fmod")
+minimum, maximum, where = _functions("minimum maximum where")
+less, less_equal, equal, not_equal = _functions("less less_equal equal not_equal")

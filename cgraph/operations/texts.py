@@ -14,16 +14,11 @@ LLVM_SIGN = (
 )
 LLVM_MINIMUM = (  # the first two lines are one instruction, which has the first argument of equal ones, and beside NaN
     "{r}.second = fcmp olt {t} {1}, {0}",
-    "{r}.least = select {b} {r}.second, {t} {1}, {t} {0}",
+    "{r}.chosen = select {b} {r}.second, {t} {1}, {t} {0}",
     "{r}.nan = fcmp uno {t} {1}, {zero}",
-    "{r} = select {b} {r}.nan, {t} {1}, {t} {r}.least",
+    "{r} = select {b} {r}.nan, {t} {1}, {t} {r}.chosen",
 )
-LLVM_MAXIMUM = (
-    "{r}.second = fcmp ogt {t} {1}, {0}",
-    "{r}.most = select {b} {r}.second, {t} {1}, {t} {0}",
-    "{r}.nan = fcmp uno {t} {1}, {zero}",
-    "{r} = select {b} {r}.nan, {t} {1}, {t} {r}.most",
-)
+LLVM_MAXIMUM = ("{r}.second = fcmp ogt {t} {1}, {0}", *LLVM_MINIMUM[1:])
 LLVM_ZERO_SAFE_MUL = (
     "{r}.a = fcmp une {t} {0}, {zero}",
     "{r}.b = fcmp une {t} {1}, {zero}",

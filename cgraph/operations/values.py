@@ -31,21 +31,6 @@ def flag(ufunc: np.ufunc) -> Callable[..., object]:
     return lambda a, b: ufunc(a, b) * 1.0
 
 
-def zero_safe_mul_arrays(a: Value, b: Value) -> Value:
-    """a * b, and 0 where a or b is 0."""
-    return np.where((a == 0) | (b == 0), 0.0, np.multiply(a, b))
-
-
-def minimum_arrays(a: Value, b: Value) -> Value:
-    """The smaller; of two zeros the first, where np.minimum takes either."""
-    return np.where((a <= b) | (a != a), a, b)
-
-
-def maximum_arrays(a: Value, b: Value) -> Value:
-    """The larger; of two zeros the first."""
-    return np.where((a >= b) | (a != a), a, b)
-
-
 def power_arrays(a: Value, b: Value) -> Value:
     """a ** b, one rule for every exponent."""
     # With one exponent for all, np.power(a, 0.5) would be a square root: -0.0 at -0.0 and NaN at -inf.
@@ -58,11 +43,6 @@ def hypot(a: float, b: float) -> float:
     """The C library's, as in NumPy and in machine code; Python's own differs from it in the last bit."""
     with np.errstate(all="ignore"):
         return float(np.hypot(a, b))
-
-
-def sign(a: float) -> float:
-    """-1.0, 0.0 or 1.0; NaN of NaN."""
-    return a if a != a else float(a > 0) - float(a < 0)
 
 
 def by_element(function: Callable[..., float]) -> Callable[..., Value]:

@@ -15,6 +15,7 @@ from ..util.words import counted
 from .statement import Lengths, Names, Statement, bodies_of, names_in, row_of
 from .statements.call import Call, Map, Sum, elements, several
 from .statements.control import FixedPoint, If
+from .statements.rows import For
 
 Text = tuple[str, int]  # a formula, and how strongly it binds, as in the table of operations
 INLINE, WIDE = 20, 100  # operations of a graph that is written as formulas, and letters of one, at most
@@ -46,6 +47,9 @@ class Listing:
             if isinstance(statement, Call | Map | Sum):
                 lines += [indent + line for line in self._graph(statement)]
                 continue
+            if isinstance(statement, For):
+                lines += [indent + line for line in self._rows(statement)]
+                continue
             bodies = [body for body in bodies_of(statement) if body]
             lines.append(indent + (self._control(statement) if bodies else self._plain(statement)))
             for k, body in enumerate(bodies):
@@ -58,6 +62,23 @@ class Listing:
         if isinstance(statement, If):
             return f"if {'' if statement.body else 'not '}{registers} > 0:"
         return f"while {registers} > 0:" + ("  # to a fixed point" if isinstance(statement, FixedPoint) else "")
+
+    def _rows(self, statement: For) -> list[str]:
+        """The rows of each kind: blocks of numbers, register[place], of a function."""
+        lines = [f"for each of {statement.count} rows{', the last first' if statement.backwards else ''}:"]
+        for number, (graph, *uses) in enumerate(statement.kinds):
+            reads, writes, adds = [
+                ", ".join([f"{at}[{table}]" if table else at for at, table, _ in ends]) for ends in uses
+            ]
+            call, size = f"{self._name(graph)}({reads})", sum([1 for node in graph.nodes if node.args])
+            ways = [f"{writes} = {call}"] * bool(writes) + [f"{adds} += {'the rest' if writes else call}"] * bool(adds)
+            kind = f"if {statement.kind} is {number}: " if len(statement.graphs) > 1 else ""
+            lines.append(f"    {kind}{', '.join(ways)}  # {counted(size, 'operation')}")
+        return lines
+
+    def _name(self, graph: Graph) -> str:
+        """The name of a function."""
+        return self._called.setdefault(id(graph), f"f{len(self._called) + self._first}")
 
     def _plain(self, statement: Statement) -> str:
         """writes = Kind(reads, other fields): of any kind."""
@@ -73,8 +94,7 @@ class Listing:
         formulas = self._formulas(statement) if size <= INLINE and id(graph) not in self._called else {}
         if formulas and max(map(len, formulas.values())) <= WIDE:
             return [f"{target} = {formula}" for target, formula in formulas.items()]
-        name = self._called.setdefault(id(graph), f"f{len(self._called) + self._first}")
-        call = f"{name}({', '.join(names_in(statement, row_of(statement).reads))})"
+        call = f"{self._name(graph)}({', '.join(names_in(statement, row_of(statement).reads))})"
         if not isinstance(statement, Call):
             call = f"{'sum of ' if isinstance(statement, Sum) else ''}{call} for each element"
         return [f"{', '.join(statement.outputs)} = {call}  # {counted(size, 'operation')}"]

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from ..core.checks import GraphError
+from ..core.evaluation import real_array
 from ..core.graph import Graph
 from ..util.explain_failure import explain_failure
 from ..util.require import require_mapping
-from . import table  # noqa: F401 (which fills the table)
 from .listing import Listing
-from .statement import Statement, bodies_of, length_of, names_in, require_length, require_once, row_of
+from .statement import (
+    Statement,
+    bodies_of,
+    effects,
+    graphs_of,
+    length_of,
+    names_in,
+    require_length,
+    require_once,
+    row_of,
+)
 from .statements.call import Call
+from .statements.rows import For, check_rows
 
 
 @explain_failure
@@ -25,8 +39,9 @@ class Program:
     `STATEMENTS`.  record: registers which, end to end, make a row of the record; record_if: one of length 1, where a
     pass at whose end it is not positive records nothing.  stop: one of length 1; the passes end after one at whose end
     it is not 0.  feed: registers which, end to end, take a row of numbers before each pass, from those handed to the
-    run.
-    Raises GraphError for a statement with an unknown register, or registers of lengths that do not fit.
+    run.  shared: {register that passes only read: its numbers}, which stand once for all memories and are in none.
+    Raises GraphError for a statement with an unknown register, or registers of lengths that do not fit; for rows of
+    shared tables that `check_shared` refuses.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, runner
@@ -43,6 +58,7 @@ class Program:
     record_if: str | None = None
     stop: str | None = None
     feed: Sequence[str] = ()
+    shared: Mapping[str, ArrayLike] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         for name, length in self.registers.items():
@@ -62,6 +78,24 @@ class Program:
             require_once(kind, names_in(statement, row.writes))
             if row.check is not None:
                 row.check(statement, self.registers)
+        if changed := [name for name in (*self.feed, *effects(self.body)[1]) if name in self.shared]:
+            raise GraphError(f"register {changed[0]!r} is written or fed, and all memories share it")
+        self.check_shared(self.shared)
+
+    def check_shared(self, numbers: Mapping[str, ArrayLike]) -> None:
+        """Raises GraphError for numbers of shared registers that do not fit, as of a runner where they were changed.
+
+        So do rows, if a `For` has all its tables here, that reach beyond a register or break the contract of `For`.
+        """
+        known = {}
+        for name, value in require_mapping("shared", numbers, "register: numbers").items():
+            length, array = length_of(self.registers, "shared", name), real_array(f"shared {name!r}", value)
+            if array.shape not in ((), (length,)):
+                raise GraphError(f"shared register {name!r} needs shape ({length},), got {array.shape}")
+            known[name] = np.broadcast_to(array, (length,))
+        for statement in self.statements() if known else ():
+            if isinstance(statement, For):
+                check_rows(statement, self.registers, known)
 
     def statements(self) -> Iterator[Statement]:
         """Every statement, outer before inner."""
@@ -113,7 +147,7 @@ class Program:
 
     def graphs(self) -> list[Graph]:
         """The graphs that statements run, each once."""
-        graphs = [getattr(statement, name) for statement in self.statements() if (name := row_of(statement).graph)]
+        graphs = [graph for statement in self.statements() for graph in graphs_of(statement)]
         return list({id(graph): graph for graph in graphs}.values())
 
 
@@ -137,7 +171,7 @@ def outliving(program: Program) -> list[str]:
     """The registers that a pass reads, or that are read after it, before it is sure to have set them."""
     read = {*program.record, *[name for name in (program.record_if, program.stop) if name is not None]}
     first = live_registers(program.body, read, {})
-    return [name for name in program.registers if name in first]
+    return [name for name in program.registers if name in first and name not in program.shared]
 
 
 def live_registers(statements: Sequence[Statement], read: Set[str], after: dict[int, Set[str]]) -> Set[str]:

@@ -42,7 +42,7 @@ class StatementRow:
     run: Rule  # (statement, state, execution): its effect on {register: list of float}
     check: Rule | None = None  # (statement, lengths): raises GraphError where registers do not fit
     bodies: Names = ()  # its fields that are statements, run as often as registers say
-    graph: str = ""  # its field that is a graph
+    graph: str = ""  # its field, or property, that is a graph, or several
     text: Rule | None = None  # (statement, writer): LLVM's text; without it, it runs in Python
     beside: Rule | None = None  # as `run`, on arrays (length, N); with it `text` has to write for vectors, too
     assign: Callable[..., Any] | None = None  # (statement, assigned): its assignment, which bodies need
@@ -50,7 +50,7 @@ class StatementRow:
     transpose: Rule | None = None  # (assignment, adjoint): adds those that pull cotangents back
 
 
-STATEMENTS: dict[type[Statement], StatementRow] = {}  # filled by table.py
+STATEMENTS: dict[type[Statement], StatementRow] = {}  # filled by statements/__init__.py
 
 
 def register_statement(row: StatementRow) -> None:
@@ -115,9 +115,10 @@ def names_in(statement: Statement, fields: Iterable[str]) -> Names:
     return tuple([name for value in values for name in ((value,) if isinstance(value, str) else value)])
 
 
-def with_names(statement: Any, fields: Iterable[str], new: Callable[[str], str]) -> Any:
-    """The statement with other registers in some fields."""
-    values = {field: getattr(statement, field) for field in fields}
+def with_names(statement: Any, new: Callable[[str], str], fields: Iterable[str] | None = None) -> Any:
+    """The statement with other registers in some fields, by default in all but those of its bodies."""
+    row = row_of(statement)
+    values = {field: getattr(statement, field) for field in ((*row.reads, *row.writes) if fields is None else fields)}
     changed = {k: new(v) if isinstance(v, str) else tuple([new(name) for name in v]) for k, v in values.items()}
     return replace(statement, **changed)
 
@@ -125,6 +126,12 @@ def with_names(statement: Any, fields: Iterable[str], new: Callable[[str], str])
 def bodies_of(statement: Statement) -> tuple[Sequence[Statement], ...]:
     """The statements that it runs itself."""
     return tuple([getattr(statement, field) for field in row_of(statement).bodies])
+
+
+def graphs_of(statement: Statement) -> tuple[Graph, ...]:
+    """The graphs that it runs."""
+    found = getattr(statement, name) if (name := row_of(statement).graph) else ()
+    return (found,) if isinstance(found, Graph) else tuple(found)
 
 
 def reads_and_writes(statement: Statement) -> tuple[Names, Names]:

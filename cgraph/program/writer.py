@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from typing import Any
 
-from ..codegen.arithmetic import Arithmetic
-from ..codegen.function_writer import FunctionWriter, copied_bytes
+from ..codegen.function_writer import Arithmetic, FunctionWriter
 from ..codegen.llvm_ir import libm_functions, write_graph
 from ..core.graph import Graph
 from ..core.node import Node
@@ -24,6 +23,12 @@ def offsets(registers: Registers, width: int) -> dict[str, int]:
         at += length if length < 2 else -(-length // width) * width
     places[""] = at
     return places
+
+
+def layout(registers: Registers, shared: Container[str], width: int) -> tuple[dict[str, int], int]:
+    """`offsets` where registers that memories share come last, and where these begin."""
+    own = {name: length for name, length in registers.items() if name not in shared}
+    return offsets({**own, **registers}, width), offsets(own, width)[""]
 
 
 class Functions:
@@ -57,11 +62,9 @@ class Functions:
         ends = [("%in0", begin) for begin in begins] or [(pointer, 0) for pointer in pointers]
         places = [_places(arithmetic.type, *end, length) for end, length in zip(ends, registers, strict=True)]
         x, y = ([place for k in which for place in places[k]] for which in (reads, writes))
-        known = set(x)
-        again = {row for row, place in enumerate(y) if place in known}
 
         def text(ir: FunctionWriter, name: str) -> None:
-            self._body(ir, name, graph, {"x": x, "y": y}, pointers, products=products, last=again)
+            self._body(ir, name, graph, {"x": x, "y": y}, pointers, products=products)
 
         key = (id(graph), registers, tuple(reads), tuple(writes), exact, begins)
         return self._define(key, "call", text, arithmetic, len(pointers), 0)
@@ -118,6 +121,16 @@ class Functions:
 
         key = ("map", id(graph), shared, inputs, outputs, count, tuple(gathered), asked)
         return self._define(key, "map", text, arithmetic, first + len(inputs) + asked, len(outputs))
+
+    def row(self, graph: Graph, blocks: int, reads: Sequence[Lengths], writes: Sequence[Lengths]) -> str:
+        """y = graph(x), where x and y end to end are so many numbers of some of the blocks, each a pointer."""
+        t, pointers = self.arithmetic.type, [f"%in{k}" for k in range(blocks)]
+        x, y = ([p for block, n in parts for p in _places(t, pointers[block], 0, n)] for parts in (reads, writes))
+
+        def text(ir: FunctionWriter, name: str) -> None:
+            self._body(ir, name, graph, {"x": x, "y": y}, pointers)
+
+        return self._define(("row", id(graph), blocks, *reads, -1, *writes), "row", text, self.arithmetic, blocks, 0)
 
     def total(self, count: int) -> str:
         """y = x[0] + .. + x[count - 1], added up in this order from 0."""
@@ -184,7 +197,7 @@ def _places(t: str, pointer: str, begin: int, count: int, step: int = 1) -> list
 class Writer(FunctionWriter):
     """The statements of a function over registers, as LLVM's text.
 
-    size: bytes of a number.  before: the statement written last.  offsets: {register: its place in %memory}.
+    size: bytes of a number.  before: the statement written last.  offsets: {register: its place in %memory}, if there.
     alone: ids of graphs that one statement calls.
     """
 
@@ -229,7 +242,7 @@ class Writer(FunctionWriter):
         beside = {output: self.beside(self.registers[output]) for output in outputs if output in inputs}
         self.call(name, [*map(self.pointer, inputs), *[beside.get(each) or self.pointer(each) for each in outputs]])
         for output, scratch in beside.items():
-            self.line(copied_bytes(self.pointer(output), scratch, self.registers[output] * self.size))
+            self.copy_bytes(self.pointer(output), scratch, self.registers[output] * self.size)
 
     def call(self, name: str, pointers: Sequence[str], *integers: int) -> None:
         """Call a function of these addresses, and of integers."""

@@ -5,17 +5,22 @@ an atom, and the sum that stands for it. By sin^2 = 1 - cos^2, sinh^2 = cosh^2 -
 addition theorems for sums and multiples of base angles, equal functions of this kind have equal sums. In a product of
 two sums those without such atoms stay together: written out they would gain nothing and lose digits. A coefficient
 counts as zero where it is no more than rounding of the terms that it came from.
+
+`expand` writes a polynomial out as a sum of monomials, to be read term by term.
 """
 
 import cmath
 from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
 from typing import NamedTuple
 
+from ..core.checks import GraphError
 from ..core.label import UNLABELLED, Label
 from ..core.node import CONSTANT, Node
 from ..core.row import Row
 from ..core.traversal import topological
-from ..operations.operation import OPS
+from ..operations.operation import OPS, columns
+from ..util.explain_failure import explain_failure
 
 COEFFICIENT_ROUNDING = 2.0**-48  # of the size of what a coefficient is summed from
 MOST_TERMS, MOST_PRODUCTS, MOST_POWER, MOST_MULTIPLE = 64, 1024, 8, 4
@@ -37,6 +42,8 @@ Powers = tuple[tuple[int, int], ...]  # (atom, power), in order of atoms
 Angle = tuple[Powers, float]  # a product, and what it is multiplied by
 Sum = dict[Powers, Term]
 Rules = Mapping[int, tuple[int, Sum]]  # {atom: (power, what stands for this power of it)}
+Monomial = tuple[tuple[str, int], ...]  # (name, power), sorted by name
+Polynomial = dict[Monomial, float]  # coefficients; terms that cancel are gone
 
 
 class Canonical:
@@ -44,10 +51,12 @@ class Canonical:
 
     made: {atom: its operation and arguments}; without an operation the node itself, and of a cosine or sine the sum
     that its angle is.  rules: those by which sums are canonical.  turns: cosines and sines by z = exp(i angle).
-    angles: {z: base angle}.  written: angles whose cosine or sine stands in the graph.
+    angles: {z: base angle}.  written: angles whose cosine or sine stands in the graph.  expanded: whether every product
+    of sums is written out.
     """
 
-    def __init__(self, outputs: Sequence[Node]) -> None:
+    def __init__(self, outputs: Sequence[Node], *, expanded: bool = False) -> None:
+        self.expanded = expanded
         self.made: dict[int, tuple[Row | None, tuple[Node, ...] | Sum]] = {}
         self.rules: dict[int, tuple[int, Sum]] = {}
         self.turns: dict[int, tuple[int, Sum]] = {}
@@ -81,12 +90,8 @@ class Canonical:
 
     def _operation(self, node: Node, args: list[Sum]) -> Sum | None:
         match node.op.name:
-            case "add":
-                return added(*args)
-            case "sub":
-                return added(args[0], scaled(args[1], -1.0))
-            case "neg":
-                return scaled(args[0], -1.0)
+            case "add" | "sub" | "neg":
+                return with_signs(columns(node.op).signs, args)
             case "mul":
                 return self.product(*(args if min(map(len, args)) <= 1 else map(self._factor, node.args)))
             case "div":
@@ -116,11 +121,10 @@ class Canonical:
         return a
 
     def _factor(self, node: Node) -> Sum:
-        """The sum of a node where identities are about it; else one product."""
+        """The sum of a node where identities are about it, or `expanded`; else one product."""
         a = self._sums[node]
-        if len(a) <= 1 or any([atom in self.rules or atom in self.turns for powers in a for atom, _ in powers]):
-            return a
-        return self._one(node)
+        ruled = self.expanded or any([atom in self.rules or atom in self.turns for powers in a for atom, _ in powers])
+        return a if ruled or len(a) <= 1 else self._one(node)
 
     def _one(self, node: Node) -> Sum:
         """A node as a coefficient times a product; a sum is one atom, that of every multiple of it."""
@@ -141,10 +145,7 @@ class Canonical:
     def _power(self, node: Node) -> Sum:
         base, power = node.args[0], int(node.args[1].value or 0.0)
         a = self._inverse(base) if power < 0 else self._factor(base)
-        result = number(1.0)
-        for _ in range(abs(power)):
-            result = self.product(result, a)
-        return result
+        return reduce(self.product, [a] * abs(power), number(1.0))
 
     def _function(self, node: Node, op: Row | None = None) -> Sum:
         """An operation, or a leaf, as an atom."""
@@ -224,6 +225,11 @@ def added(a: Sum, b: Sum) -> Sum:
     return without_zeros(collected([*a.items(), *b.items()]))
 
 
+def with_signs(signs: Sequence[int], args: Sequence[Sum]) -> Sum:
+    """The sum of arguments, each with its sign."""
+    return reduce(added, [a if sign > 0 else scaled(a, -1.0) for sign, a in zip(signs, args, strict=True)])
+
+
 def scaled(a: Sum, factor: complex) -> Sum:
     """factor a."""
     return {powers: Term(factor * x.value, abs(factor) * x.size, x.label) for powers, x in a.items()}
@@ -283,3 +289,50 @@ def without_zeros(a: Sum) -> Sum:
 def key(a: Sum) -> frozenset[tuple[Powers, complex]]:
     """Key that equal sums share."""
     return frozenset([(powers, term.value) for powers, term in a.items()])
+
+
+@explain_failure
+def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
+    """The terms of a node that is built by +, -, * and whole powers from variables and constants.
+
+    As {monomial: coefficient}, a monomial being ((name, power), ...) in order of names; terms that cancel are absent.
+    atoms: {inner node: name}, nodes that are written as one symbol. Raises GraphError for any other operation.
+    """
+    order, atoms = topological([node]), atoms or {}
+    symbols = {inner: atoms.get(inner, inner.name) for inner in order if inner in atoms or not inner.args}
+    names = sorted({name for name in symbols.values() if name})
+    sums: dict[Node, Sum] = {}
+    for inner in order:
+        name = symbols.get(inner)
+        sums[inner] = single(names.index(name)) if name else _expanded(inner, [sums[arg] for arg in inner.args])
+    return {
+        tuple([(names[atom], power) for atom, power in powers]): term.value.real
+        for powers, term in without_zeros(sums[node]).items()
+    }
+
+
+@explain_failure
+def format_polynomial(terms: Polynomial) -> str:
+    """A polynomial, see `expand`, as text, terms in order of degree and name; "0" without terms."""
+    text = ""
+    for monomial, coefficient in sorted(terms.items(), key=lambda item: (sum(p for _, p in item[0]), item[0])):
+        factors = [name if power == 1 else f"{name}^{power}" for name, power in monomial]
+        size = abs(coefficient)
+        if size != 1.0 or not factors:
+            factors.insert(0, f"{size:g}")
+        sign = "-" if coefficient < 0 else "+"
+        text += f" {sign} {'*'.join(factors)}" if text else ("-" if sign == "-" else "") + "*".join(factors)
+    return text or "0"
+
+
+def _expanded(node: Node, args: list[Sum]) -> Sum:
+    if node.op is CONSTANT:
+        return number(node.value or 0.0)
+    match node.op.name:
+        case "add" | "sub" | "neg":
+            return with_signs(columns(node.op).signs, args)
+        case "mul":
+            return multiplied(*args)
+        case "pow" if (power := node.args[1].value) is not None and power >= 0 and power == int(power):
+            return reduce(multiplied, [args[0]] * int(power), number(1.0))
+    raise GraphError(f"only sums, products and whole powers can be expanded, got {node.op.name}")

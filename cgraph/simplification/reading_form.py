@@ -10,15 +10,20 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial, reduce
 
-from ..core.node import CONSTANT, Node
+from ..core.node import CONSTANT, Node, constant
 from ..core.traversal import topological
+from ..operations.operation import OPS, columns
 from ..util.explain_failure import explain_failure
 from ..writing.naming import with_name
 from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum
 from .identities import shortest
-from .ordered_terms import ARITHMETIC, FUNCTION, RATE, OrderedTerms, Signed, ink, inks
 
+FUNCTION, RATE = 2, 3  # ranks of factors: a function stands behind coordinates, before their rates
+ARITHMETIC = ("add", "sub", "neg", "mul", "div", "pow")
+Rank = tuple[int, int]  # of a factor, and its place among those of that rank
+Signed = tuple[bool, Node]  # whether it is subtracted, and what
 TERMS, LONGEST = 48, 200.0  # terms and symbols of what is written out, at most
 LARGEST = 120  # nodes of one that is written out
 WORTH = 1.6  # so much longer may be what is written out
@@ -47,13 +52,19 @@ def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None, 
     return [written[i] for i in range(len(nodes))]
 
 
-class _Reader(OrderedTerms):
-    """The maker of the nodes of a reading form."""
+class _Reader:
+    """The maker of the nodes of a reading form, each of them once.
 
-    def __init__(self, ranks: Mapping[str, int], largest: int = LARGEST) -> None:
-        super().__init__(ranks)
+    ranks, largest: see `reading_form`.
+    """
+
+    def __init__(self, ranks: Mapping[str, int], largest: int) -> None:
+        self.ranks = {name: (rank, place) for place, (name, rank) in enumerate(ranks.items())}
         self.largest = largest
         self.left = 4 * largest  # nodes that may still be written out
+        self._made: dict[tuple[object, ...], Node] = {}
+        self._numbers: dict[Node, tuple[float, Node]] = {}  # products with a number before them
+        self._rank: dict[Node, Rank] = {}
 
     def shorter(self, order: Sequence[Node], tidy: Node) -> Node:
         """The last node of an order written out where that is short, else as it stands."""
@@ -61,7 +72,8 @@ class _Reader(OrderedTerms):
         if len(order) > self.largest or any(each.name and each.args for each in order[:-1]) or self.left < len(order):
             return tidy
         self.left -= len(order)
-        sums = [canonical for canonical in (_Expanded([node]), Canonical([node])) if len(canonical[node]) <= TERMS]
+        both = [Canonical([node], expanded=expanded) for expanded in (True, False)]
+        sums = [each for each in both if len(each[node]) <= TERMS]
         forms = [_Writer(self, canonical, node).node for canonical in sums]
         out = min(forms, key=lambda form: ink(form) / (PLAINER if form is forms[0] else 1.0), default=tidy)
         return out if ink(out) <= min(WORTH * ink(tidy), LONGEST) else tidy
@@ -80,11 +92,10 @@ class _Reader(OrderedTerms):
         done: dict[Node, Node] = {}
         for node in order:
             sums[node], products[node] = self._terms(node, sums, alone), self._factors(node, products, done, alone)
-            done[node] = self._written(node, sums[node], products[node], done)
-            if node.name and node.args and uses[node] > (node in ends):
-                done[node] = (
-                    with_name(Node(done[node].op, done[node].args), node.name) if done[node].args else done[node]
-                )
+            made = self._written(node, sums[node], products[node], done)
+            if node.name and node.args and made.args and uses[node] > (node in ends):
+                made = with_name(Node(made.op, made.args), node.name)
+            done[node] = made
             if node.value is None and (node not in alone or node.op.name not in ARITHMETIC):
                 sums[node], products[node] = [(False, node)], (1.0, {done[node]: 1})
         return [done[node] for node in nodes]
@@ -92,10 +103,9 @@ class _Reader(OrderedTerms):
     def _terms(self, node: Node, sums: Mapping[Node, list[Signed]], alone: set[Node]) -> list[Signed]:
         if node.op.name not in ("add", "sub", "neg"):
             return [(False, node)]
-        negative = {"add": (False, False), "sub": (False, True), "neg": (True,)}[node.op.name]
         return [
-            (minus != each, term)
-            for arg, minus in zip(node.args, negative, strict=True)
+            ((sign < 0) != each, term)
+            for arg, sign in zip(node.args, columns(node.op).signs, strict=True)
             for each, term in (sums[arg] if arg in alone else [(False, arg)])
         ]
 
@@ -117,13 +127,12 @@ class _Reader(OrderedTerms):
             return 1.0, ({node: 1} if not args else {})
         coefficient, powers = -1.0 if name == "neg" else 1.0, dict[Node, int]()
         for arg, times in parts:
-            inner = products[arg] if arg in alone or arg.value is not None else (1.0, {done[arg]: 1})
-            if not inner[1] and arg.value is None:
-                inner = 1.0, {done[arg]: 1}
-            if (not 1e-100 < abs(inner[0]) < 1e100 and abs(times) > 1) or inner[0] == 0.0 > times:
-                inner = 1.0, {done[arg]: 1}
-            coefficient *= inner[0] ** times
-            for factor, count in inner[1].items():
+            number, factors = products[arg]
+            kept = arg.value is None and (arg not in alone or not factors)
+            if kept or (not 1e-100 < abs(number) < 1e100 and abs(times) > 1) or number == 0.0 > times:
+                number, factors = 1.0, {done[arg]: 1}
+            coefficient *= number**times
+            for factor, count in factors.items():
                 powers[factor] = powers.get(factor, 0) + count * times
         return coefficient, powers
 
@@ -139,12 +148,92 @@ class _Reader(OrderedTerms):
             return self.make("neg", made) if minus else made
         return self.make(node.op.name, *[done[arg] for arg in node.args])
 
+    # Sums and products in order.
 
-class _Expanded(Canonical):
-    """Canonical sums in which every product of sums is written out."""
+    def make(self, name: str, *args: Node) -> Node:
+        """The one node of an operation."""
+        if (known := self._made.get((name, *args))) is None:
+            known = self._made[name, *args] = Node(OPS[name], args)
+        return known
 
-    def _factor(self, node: Node) -> Sum:
-        return self[node]
+    def signed(self, minus: bool, node: Node) -> Signed:
+        """A term of a sum, its sign apart."""
+        if node.op.name == "neg":
+            return not minus, node.args[0]
+        if node.value is not None and node.value < 0.0:
+            return not minus, constant(-node.value)
+        return minus, node
+
+    def operation(self, name: str, args: Sequence[Node]) -> Node:
+        """An operation on nodes that are made, a sum or a product in order."""
+        if name in ("add", "sub"):
+            return self.sum([self.signed(False, args[0]), self.signed(name == "sub", args[1])])
+        if name in ("mul", "div", "neg") and all(arg.value is None for arg in args):
+            powers = dict.fromkeys(args[:1], 1)
+            for arg in args[1:]:
+                powers[arg] = powers.get(arg, 0) + (1 if name == "mul" else -1)
+            minus, made = self.product(-1.0 if name == "neg" else 1.0, powers)
+            return self.make("neg", made) if minus else made
+        return self.make(name, *args)
+
+    def sum(self, terms: Sequence[Signed]) -> Node:
+        """Terms added up, a positive one first."""
+        if not terms:
+            return constant(0.0)
+        ranks = {node: self.rank(node) for _, node in terms}
+        order = sorted(terms, key=lambda term: (-ranks[term[1]][0], ranks[term[1]][1]))
+        first = next((i for i, (minus, _) in enumerate(order) if not minus), 0)
+        order = [order[first], *order[:first], *order[first + 1 :]]
+        minus, total = order[0]
+        total = self.make("neg", total) if minus else total
+        for minus, node in order[1:]:
+            total = self.make("sub" if minus else "add", total, node)
+        return total
+
+    def product(self, coefficient: float, powers: Mapping[Node, int]) -> Signed:
+        """A product, its sign apart: a number, factors by rank, over those of negative powers."""
+        held: dict[Node, int] = {}
+        for node, power in powers.items():
+            number, rest = self._apart(node)
+            coefficient *= number**power
+            held[rest] = held.get(rest, 0) + power
+        factors = sorted([each for each in held.items() if each[1]], key=lambda each: self.rank(each[0]))
+        top = [self._power(node, power) for node, power in factors if power > 0]
+        below = [self._power(node, -power) for node, power in factors if power < 0]
+        size, minus = abs(coefficient), math.copysign(1.0, coefficient) < 0.0
+        node = self._times(top) if top else constant(size)
+        if top and size != 1.0:
+            self._numbers[whole := self.make("mul", constant(size), node)] = size, node
+            node = whole
+        return minus, self.make("div", node, self._times(below)) if below else node
+
+    def _apart(self, node: Node) -> tuple[float, Node]:
+        """The number before a product, and the rest."""
+        sign, node = (-1.0, node.args[0]) if node.op.name == "neg" else (1.0, node)
+        number, rest = self._numbers.get(node, (1.0, node))
+        return sign * number, rest
+
+    def _times(self, factors: Sequence[Node]) -> Node:
+        return reduce(partial(self.make, "mul"), factors)
+
+    def _power(self, node: Node, power: int) -> Node:
+        return node if power == 1 else self.make("pow", node, constant(float(power)))
+
+    def rank(self, node: Node) -> Rank:
+        """The place of a factor in a product: the rank of a name, of a rate in it, else that of a function."""
+        if node not in self._rank:
+            for each in topological([node]):
+                if each not in self._rank:
+                    self._rank[each] = self._ranked(each)
+        return self._rank[node]
+
+    def _ranked(self, node: Node) -> Rank:
+        if not node.args:
+            return (-1, 0) if node.value is not None else self.ranks.get(str(node.name), (0, len(self.ranks)))
+        inner = [self._rank[arg] for arg in node.args]
+        rank = max([each for each, _ in inner])
+        place = min([place for each, place in inner if each == rank])
+        return (rank, place) if rank >= RATE or node.op.name in ARITHMETIC else (FUNCTION, place)
 
 
 class _Writer:
@@ -153,9 +242,7 @@ class _Writer:
     def __init__(self, reader: _Reader, canonical: Canonical, node: Node) -> None:
         self.reader, self.canonical = reader, canonical
         self._atoms: dict[int, Node] = {}
-        for atom in sorted(
-            self._needed(canonical[node])
-        ):  # as they are made, arguments first: deep graphs recur nowhere
+        for atom in sorted(self._needed(canonical[node])):  # as they are made: deep graphs recur nowhere
             self._atom(atom)
         self.node = self._sum(canonical[node])
 
@@ -190,13 +277,12 @@ class _Writer:
             parts.setdefault(rates, {})[others] = term.value.real
         alike: list[tuple[dict[Powers, float], list[tuple[float, Powers]]]] = []
         for rates, rest in parts.items():
-            ratio, known = next(
-                ((ratio, known) for first, known in alike if (ratio := _ratio(rest, first))), (1.0, None)
-            )
-            if known is None:
-                alike.append((rest, [(1.0, rates)]))
+            for first, known in alike:
+                if ratio := _ratio(rest, first):
+                    known.append((ratio, rates))
+                    break
             else:
-                known.append((ratio, rates))
+                alike.append((rest, [(1.0, rates)]))
         return self.reader.sum([term for rest, rates in alike for term in self._group(rest, rates)])
 
     def _group(self, rest: dict[Powers, float], rates: list[tuple[float, Powers]]) -> list[Signed]:
@@ -254,8 +340,7 @@ class _Writer:
 
 def _shared(products: Iterable[Powers]) -> dict[int, int]:
     """The powers of atoms that all products have."""
-    first, *others = map(dict, products)
-    shared = dict(first)
+    shared, *others = map(dict, products)
     for powers in others:
         shared = {
             atom: min(power, powers[atom], key=abs) for atom, power in shared.items() if powers.get(atom, 0) * power > 0
@@ -273,3 +358,16 @@ def _ratio(a: Mapping[Powers, float], b: Mapping[Powers, float]) -> float:
     ratios = RATIOS if b.keys() != {()} else RATIOS[:1] * (abs(b[()]) != 1.0)
     near = next((each for each in ratios if abs(abs(first) - each) <= COEFFICIENT_ROUNDING * each), 0.0)
     return math.copysign(near, first) if same else 0.0
+
+
+def ink(node: Node) -> float:
+    """Symbols of a node that is written without lines of its own."""
+    return inks(topological([node]))[node]
+
+
+def inks(order: Sequence[Node]) -> dict[Node, float]:
+    """Symbols of each node of an order, arguments first."""
+    size: dict[Node, float] = {}
+    for each in order:
+        size[each] = 1.0 + sum([size[arg] for arg in each.args]) - (each.op.name in ("mul", "pow"))
+    return size

@@ -39,13 +39,11 @@ def error_bounds(
     values: Mapping[str, Value],
     unit: float = ERROR_UNIT,
     of_inputs: float = 0.0,
-    stored: Callable[[float], float] = float,
 ) -> tuple[dict[Node, Value], dict[Node, Value]]:
     """Values of nodes, arguments first, and bounds of their errors to first order, with roundings to a part of `unit`.
 
     An error passes on through the local partials, in absolute value, and each operation adds its own.
-    values: {input: number or array}.  of_inputs: error of an input, relative to its value.  stored: a constant, as the
-    program has it.
+    values: {input: number or array}.  of_inputs: error of an input, relative to its value.
     """
     partials, found = _with_partials(nodes, values)
     errors: dict[Node, Value] = {}
@@ -53,7 +51,7 @@ def error_bounds(
         for node in nodes:
             pairs = zip(partials.get(node, ()), node.args, strict=True)
             inherited = [OPS["zero_safe_mul"].array(np.abs(found[slope]), errors[arg]) for slope, arg in pairs]
-            errors[node] = sum(inherited) + _own_error(node, found[node], unit, of_inputs, stored)
+            errors[node] = sum(inherited) + _own_error(node, found[node], unit, of_inputs)
     return found, errors
 
 
@@ -68,7 +66,8 @@ def output_bounds(
     """Values of nodes, arguments first, and bounds, (outputs, points), of the errors of outputs to first order.
 
     An output's error is the sum of all own errors times its derivatives, by a reverse sweep: ways cancel with their
-    signs, where `error_bounds` adds up sizes. Arguments as there, values of (points,).
+    signs, where `error_bounds` adds up sizes. Arguments as there, values of (points,).  stored: a constant, as the
+    program has it.
     """
     partials, found = _with_partials(nodes, values)
     bars: dict[Node, Array] = {}  # derivatives of the outputs by a node, (outputs, points)
@@ -97,7 +96,9 @@ def _with_partials(
     return partials, dict(zip(needed, evaluate(needed, numbered, values).values(), strict=True))
 
 
-def _own_error(node: Node, value: Value, unit: float, of_inputs: float, stored: Callable[[float], float]) -> Value:
+def _own_error(
+    node: Node, value: Value, unit: float, of_inputs: float, stored: Callable[[float], float] = float
+) -> Value:
     """The error that a node adds by itself: of an operation, an input, or a constant as it is stored."""
     if node.value is not None:
         return abs(stored(node.value) - node.value)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from ..core.builder import Builder, folded
 from ..core.checks import GraphError
 from ..core.graph import Graph
-from ..core.node import Node, Scalar, as_node, constant
+from ..core.node import Node, Scalar, as_node, named_node
 from ..core.traversal import rebuild
 from ..operations.operation import OPS
 from ..util.require import require_graph, require_mapping, require_sequence
@@ -84,10 +84,7 @@ def specialize(graph: Graph, values: Mapping[str, Scalar], outputs: Sequence[str
     require_sequence("values", require_mapping("values", values, "input: number or node"), "inputs", (str, Node))
     for name, value in values.items():
         (node,) = graph.select_inputs(name)
-        try:
-            replace[node] = value if isinstance(value, Node) else constant(value)
-        except (TypeError, ValueError) as error:
-            raise type(error)(f"input {name!r}: {error}") from None
+        replace[node] = named_node(f"input {name!r}", value)
     if outputs is not None:
         outputs = require_sequence("outputs", outputs, "names")
         if unknown := [str(name) for name in outputs if not isinstance(name, str) or name not in graph.outputs]:

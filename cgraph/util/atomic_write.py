@@ -35,8 +35,6 @@ def write_files(files: Mapping[Path, str | bytes]) -> None:
             temporary = temporaries.enter_context(_beside(target))
             with _named(target):
                 temporary.write_bytes(data.encode() if isinstance(data, str) else data)
-            if target.is_dir():
-                raise _folder(target)
             written.append((temporary, target))
         for temporary, target in written:
             with _named(target):
@@ -55,10 +53,7 @@ def check_writable(path: str | Path) -> None:
         if not os.access(path, os.W_OK):  # opening a pipe would wait for its reader
             raise PermissionError(errno.EACCES, f"cannot write {path}: {os.strerror(errno.EACCES)}")
         return
-    target = Path(path).resolve()
-    if target.is_dir():
-        raise _folder(target)
-    with _beside(target):
+    with _beside(Path(path).resolve()):
         pass
 
 
@@ -71,13 +66,12 @@ def _is_device(path: Path) -> bool:
     return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
 
 
-def _folder(target: Path) -> OSError:
-    return IsADirectoryError(errno.EISDIR, f"cannot write {target}: that is a folder")
-
-
 @contextmanager
 def _beside(target: Path) -> Iterator[Path]:
     """A new empty file beside a file that is to be written; what is left of it goes in the end."""
+    with _named(target):
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "that is a folder")
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
         with _named(target):

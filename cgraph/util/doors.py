@@ -61,26 +61,19 @@ def doors(
     return load, lambda: sorted({*vars(sys.modules[package]), *names()})
 
 
-class MovedMethod:
-    """A method whose place a function of the package has taken, which it calls with a warning."""
+def moved_methods(kind: type, package: str, names: Collection[str], alone: Collection[str] = ()) -> None:
+    """Keep, with a warning, methods of a class that are functions now.  alone: those that took no object."""
 
-    def __init__(self, package: str, name: str, alone: bool) -> None:
-        self.package, self.name, self.alone = package, name, alone
-
-    def __get__(self, owner: object, kind: type) -> Callable[..., object]:
+    def moved(name: str) -> Callable[..., object]:
         def call(*args: object, **named: object) -> object:
-            text = f"{kind.__name__}.{self.name} goes with the next version: call {self.package}.{self.name}"
+            text = f"{kind.__name__}.{name} goes with the next version: call {package}.{name}"
             warnings.warn(text, DeprecationWarning, stacklevel=2)
-            function = getattr(sys.modules[self.package], self.name)
-            return function(*args if owner is None or self.alone else (owner, *args), **named)
+            return getattr(sys.modules[package], name)(*args, **named)
 
         return call
 
-
-def moved_methods(kind: type, package: str, names: Collection[str], alone: Collection[str] = ()) -> None:
-    """Keep methods of a class that are functions of a package now.  alone: those that took no object."""
     for name in names:
-        setattr(kind, name, MovedMethod(package, name, name in alone))
+        setattr(kind, name, staticmethod(moved(name)) if name in alone else moved(name))
 
 
 def _homes(file: str) -> Homes:

@@ -1,4 +1,4 @@
-"""The extras of the distribution: what errors about missing packages say, and SciPy, which is imported here alone."""
+"""The extras of the distribution: what errors about missing packages say."""
 
 from __future__ import annotations
 
@@ -12,11 +12,6 @@ def install(extra: str) -> str:
     The argument of the command is quoted, since some shells expand brackets.
     """
     return f"in a checkout of cgraph, pip install -e '.[{extra}]'"
-
-
-def scipy_module(name: str, what: str) -> ModuleType:
-    """SciPy's module `integrate` or `sparse`. Raises ImportError, that `what` needs it, where there is none."""
-    return required(f"scipy.{name}", f"{what} needs SciPy", "scipy")
 
 
 def required(module: str, needs: str, extra: str) -> ModuleType:

@@ -8,9 +8,7 @@ from ..core.evaluation import Array
 
 def require_memory(name: str, array: object, *shapes: tuple[int, ...]) -> None:
     """Raise GraphError unless machine code can use the array as it lies."""
-    wanted = " or ".join(map(str, shapes))
-    if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape not in shapes:
-        raise GraphError(f"{name} must be an array of float64 in shape {wanted}, got {describe(array)}")
+    array = _require_shape(name, array, *shapes)
     if not array.flags.c_contiguous or not array.flags.aligned:
         raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")
 
@@ -25,14 +23,16 @@ def require_target(name: str, target: Array, of: str, read: Array) -> None:
 
 def require_out(out: Array, shape: tuple[int, int], points: Array) -> None:
     """Raise GraphError unless results of that shape can be written there while the points are read."""
-    if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != shape:
-        raise GraphError(f"out must be an array of float64 in shape {shape}, got {describe(out)}")
-    require_target("out", out, "X", points)
+    require_target("out", _require_shape("out", out, shape), "X", points)
 
 
-def describe(value: object) -> str:
-    """Description of a value that should have been an array of float64 of some shape."""
-    return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+def _require_shape(name: str, array: object, *shapes: tuple[int, ...]) -> Array:
+    """The value, if it is an array of float64 of one of these shapes."""
+    if isinstance(array, np.ndarray) and array.dtype == np.float64 and array.shape in shapes:
+        return array
+    wanted = " or ".join(map(str, shapes))
+    got = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+    raise GraphError(f"{name} must be an array of float64 in shape {wanted}, got {got}")
 
 
 def lies_in_rows(points: Array) -> bool:

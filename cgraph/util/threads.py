@@ -14,8 +14,6 @@ from ..core.evaluation import Array
 
 def thread_count(threads: int | None) -> int:
     """The number of threads that an argument `threads` asks for: at least 1; None is one for each core."""
-    if type(threads) is int and threads > 0:
-        return threads
     if threads is None:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:

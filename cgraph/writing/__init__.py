@@ -1,1 +1,1 @@
-"""Writing: a graph as text, formulas, counts, hashes, records, and as a graph of networkx."""
+"""Writing: formulas, names, source lines, hashes, and a graph as one of networkx."""

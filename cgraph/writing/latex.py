@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 from xml.etree import ElementTree
 
 from ..core.graph import Graph
@@ -22,7 +23,10 @@ _FUNCTIONS = {name: f"\\{name}" for name in "sin cos tan sinh cosh tanh exp".spl
 _FUNCTIONS |= {"log": r"\ln", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan"}
 _FUNCTIONS |= {"minimum": r"\min", "maximum": r"\max"}
 _KNOWN = ("log", "min", "max")  # functions of LaTeX that rows name
+_FORMS = {"msup": "{{{}}}^{{{}}}", "msub": "{}_{{{}}}", "mfrac": r"\frac{{{}}}{{{}}}", "mroot": r"\sqrt[{1}]{{{0}}}"}
 _SPECIAL = {"\\": r"\backslash ", "^": r"\hat{}", "~": r"\sim "} | {sign: f"\\{sign}" for sign in "#$%&_{}"}
+
+FormulaPart = str | int | list[Any]  # of a formula: a text, the number of an argument, [element, attributes, *parts]
 
 
 def latex(what: Node | Graph, *, names: Mapping[str, str] | None = None, lines: int = LINES) -> str:
@@ -126,7 +130,7 @@ def operation_text(op: Op, args: Sequence[Text]) -> Text:
     inside = [
         _fenced(text) if binds < least else text for (text, binds), least in zip(args, op.mathml.least, strict=True)
     ]
-    text = _template(op)(inside)
+    text = _part(formula_tree(op), inside).strip()
     return re.sub(r"\\cdot (?=[^0-9\-.])", r"\\, ", text), op.mathml.binding
 
 
@@ -135,45 +139,44 @@ def _fenced(text: str) -> str:
 
 
 @memo(OPERATIONS)
-def _template(op: Op) -> Callable[[Sequence[str]], str]:
-    """The function that puts arguments into an operation's formula."""
+def formula_tree(op: Op) -> FormulaPart:
+    """The MathML of an operation as a tree. Raises ValueError where it is not well formed."""
     mathml = "" if op.mathml is None else op.mathml.text
     try:
-        root = ElementTree.fromstring(f"<mrow>{mathml}</mrow>")  # noqa: S314 (the table's own text)
+        return _tree(ElementTree.fromstring(f"<mrow>{mathml}</mrow>"))  # noqa: S314 (the table's own text)
     except ElementTree.ParseError as error:
-        raise ValueError(f"the MathML {mathml!r} of an operation is not well formed: {error}") from None
-    text = re.sub(r"@(\d)@", r"{\1}", _element(root).replace("{", "{{").replace("}", "}}"))
-    return lambda args: text.format(*args).strip()
+        raise ValueError(f"the MathML {mathml!r} of operation {op.name!r} is not well formed: {error}") from None
 
 
-def _element(element: ElementTree.Element) -> str:
-    """The LaTeX of an element, an argument's place written @0@."""
-    inside = element.text or ""
-    parts = [part for child in element for part in (_element(child), _places(child.tail)) if part]
-    if element.tag in ("msup", "msub", "mfrac", "mroot"):  # two parts, one of which may be text between elements
-        parts = [part for part in (*re.findall(r"@\d@", _places(inside)), *parts) if part]
-        parts = [each for part in parts for each in (re.findall(r"@\d@", part) if part.startswith("@") else [part])]
-        first, second = parts
-        forms: Mapping[str, str] = {
-            "msup": f"{{{first}}}^{{{second}}}",
-            "msub": f"{first}_{{{second}}}",
-            "mfrac": rf"\frac{{{first}}}{{{second}}}",
-            "mroot": rf"\sqrt[{second}]{{{first}}}",
-        }
-        return forms[element.tag]
-    text = _places(inside) + "".join(parts)
-    if element.tag == "msqrt":
+def _tree(element: ElementTree.Element) -> FormulaPart:
+    parts = _text_parts(element.text)
+    for child in element:
+        parts += [_tree(child), *_text_parts(child.tail)]
+    return [element.tag, element.attrib, *parts]
+
+
+def _text_parts(text: str | None) -> list[FormulaPart]:
+    """Text and the numbers of arguments, which stand as {0}, {1}, .. in it."""
+    return [int(part) if k % 2 else part for k, part in enumerate(re.split(r"{(\d)}", text or "")) if part]
+
+
+def _part(part: FormulaPart, args: Sequence[str]) -> str:
+    """The LaTeX of a part of a formula."""
+    if not isinstance(part, list):
+        return part if isinstance(part, str) else args[part]
+    tag, _, *inside = part
+    parts = [_part(each, args) for each in inside]
+    if tag in _FORMS:
+        return _FORMS[tag].format(*parts)
+    text = "".join(parts)
+    if tag == "msqrt":
         return rf"\sqrt{{{text}}}"
-    if element.tag == "mo":
-        sign = _SIGNS.get(inside, inside)
-        return sign if inside in "()|" else f" {sign} "
-    if element.tag == "mi" and len(inside) > 1:
-        return rf"\{inside}" if inside in _KNOWN else literal(inside)
+    if tag == "mo":
+        sign = _SIGNS.get(text, text)
+        return sign if text in "()|" else f" {sign} "
+    if tag == "mi" and len(text) > 1:
+        return rf"\{text}" if text in _KNOWN else literal(text)
     return text
-
-
-def _places(text: str | None) -> str:
-    return re.sub(r"{(\d)}", r"@\1@", text or "")
 
 
 def _matrix(rows: Sequence[Sequence[str]]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from itertools import chain, count
 from typing import NamedTuple
 
 from ..core.checks import check_name
@@ -81,11 +82,8 @@ def with_name(node: Node, name: str) -> Node:
 
 def free_suffix(suffix: str, taken: Collection[str], names: Sequence[str]) -> str:
     """`suffix`, numbered if need be, so that no name + suffix is taken."""
-    candidate, number, known = suffix, 1, set(taken)
-    while any(name + candidate in known for name in names):
-        number += 1
-        candidate = f"{suffix}{number}"
-    return candidate
+    known, numbered = set(taken), (f"{suffix}{number}" for number in count(2))
+    return next(each for each in chain([suffix], numbered) if known.isdisjoint([name + each for name in names]))
 
 
 class Remarks(NamedTuple):

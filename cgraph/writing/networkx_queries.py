@@ -56,16 +56,15 @@ def to_networkx(graph: Graph) -> networkx.MultiDiGraph:
     require_graph("to_networkx", graph)
     nodes, inputs = graph.nodes, graph.inputs
     result = networkx.MultiDiGraph()
-    number: dict[Node, int] = {}
+    number = {node: k for k, node in enumerate(dict.fromkeys((*nodes, *inputs)))}
     places = {node: place for place, node in enumerate(inputs)}
     named: dict[Node, dict[str, int]] = {}
     for place, (name, node) in enumerate(graph.outputs.items()):
         named.setdefault(node, {})[name] = place
-    for node in dict.fromkeys((*nodes, *inputs)):
-        number[node] = len(number)
+    for node, k in number.items():
         there = {"name": node.name, "number": node.value, "input": places.get(node)}
         result.add_node(
-            number[node],
+            k,
             op=node.op.name,
             **{name: value for name, value in there.items() if value is not None},
             **{name: _text(sorted(getattr(node, name))) for name in LABELS},
@@ -131,12 +130,8 @@ def from_networkx(network: networkx.DiGraph) -> Graph:
         arity = OPS[op].arity if op in OPS else 0
         if sorted(slots) != list(range(arity)) or network.in_degree(key) != arity:
             raise GraphError(f"node {key!r}, {op}, takes {arity} arguments in slots from 0, got {sorted(slots)}")
-        labels = tuple(
-            [  # a source line is a list in JSON
-                tuple([SourceLine(*each) if isinstance(each, list) else each for each in read(label, json.loads, ())])
-                for label in LABELS
-            ]
-        )
+        sets = [read(label, json.loads, ()) for label in LABELS]  # in which a source line is a list
+        labels = tuple([tuple([SourceLine(*x) if isinstance(x, list) else x for x in each]) for each in sets])
         kept.append((op, tuple([slots[slot] for slot in range(arity)]), value, name, labels))
         outputs |= {place: (output, number[key]) for output, place in read("outputs", json.loads, {}).items()}
     given = tuple([inputs[place] for place in sorted(inputs)])

@@ -58,9 +58,8 @@ def node_hashes(nodes: Iterable[Node], atoms: Mapping[Node, str] | None = None) 
             digests[node] = _digest(b"constant", struct.pack("<d", node.value))
         else:
             arguments = [digests[arg] for arg in node.args]
-            digests[node] = _digest(
-                b"node", _text(node.op.name), *(sorted(arguments) if node.op.commutative else arguments)
-            )
+            ordered = sorted(arguments) if node.op.commutative else arguments
+            digests[node] = _digest(b"node", _text(node.op.name), *ordered)
     return digests
 
 

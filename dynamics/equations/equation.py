@@ -108,10 +108,12 @@ class Equation:
     def __call__(self, derivation: Derivation) -> GraphOfModel[[]]:
         """The public function of a derivation."""
 
+        def smallest(system: System) -> Graph:
+            return min([cg.simplify(self.graph(system, nodes)) for nodes in derivation(system)], key=_size)
+
         def graph(model: Model) -> Graph:
             system = as_system(model)
-            graph = shortened(system, self._of(derivation)) if self.rewritten else self._of(derivation)(system)
-            return called(graph, model)
+            return called(shortened(system, smallest) if self.rewritten else smallest(system), model)
 
         update_wrapper(graph, derivation, ("__module__", "__name__", "__qualname__", "__doc__"))
         graph.__signature__ = signature(graph, follow_wrapped=False)  # type: ignore[attr-defined]
@@ -138,17 +140,10 @@ class Equation:
         text = f"Inputs {inputs}, t if needed, parameters; {outputs} {'; '.join(map(str, self.outputs))}. {more}"
         return f"Graph\n{textwrap.indent(textwrap.fill(' '.join(text.split()), WIDTH), '    ')}"
 
-    def _of(self, derivation: Derivation) -> Callable[[System], Graph]:
-        return lambda system: min([cg.simplify(self.graph(system, nodes)) for nodes in derivation(system)], key=_size)
-
 
 def called(graph: Graph, model: Model) -> Graph:
     """The graph, which a notebook draws with the names that a person calls its inputs and outputs by."""
-
-    def remarks(_: Graph) -> _shared.Remarks:
-        return _shared.Remarks(display_names(model))
-
-    return _shared.remarked(graph, remarks)
+    return _shared.remarked(graph, lambda _: _shared.Remarks(display_names(model)))
 
 
 def documented(

@@ -15,10 +15,9 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import Array, real_array
 
-from ..equations.energies import energy
+from ..equations.equations_of_motion import energy
 from ..equations.state_equation import state_inputs
-from ..multiprecision import Reference, reference
-from ..multiprecision.solution import from_text, scale
+from ..multiprecision.reference import Reference, from_text, reference, scale
 from ..scenes import Scene
 from ..systems.model import Model, as_ode, as_system
 
@@ -152,6 +151,14 @@ class StabilityCase(AccuracyTask):
             object.__setattr__(self, "invariants", conserved())
 
 
+def case(
+    name: str, about: str, model: Model, start: tuple[float, ...], t_end: float, *criteria: Criterion, **more: Any
+) -> StabilityCase:
+    """A case from its states, q and then qd, or those of an OdeSystem.  more: the fields that go on from there."""
+    nq = len(model.coordinates)
+    return StabilityCase(name, about, model, start[:nq], start[nq:], t_end, criteria=criteria, **more)
+
+
 def error_criterion(growth: float, why: str = GROWN) -> Criterion:
     """The bound of a well-behaved method: local errors of RTOL, grown as the flow grows them."""
     return Criterion("error", SLACK * RTOL * max(growth, 1.0), why)
@@ -162,25 +169,15 @@ def energy_criterion(scale: float, why: str = "nothing takes energy in or out") 
     return Criterion("energy", SLACK * RTOL, why, scale)
 
 
-def conserved(**others: Callable[..., Node]) -> Callable[[Model], Graph]:
-    """The energy of a mechanical model, and others: functions of (q, qd) that give a node."""
+def conserved(**functions: Callable[..., Node]) -> Callable[[Model], Graph]:
+    """Functions of the state of an OdeSystem, or of (q, qd) of a mechanical model, whose energy goes with them."""
 
     def graph(model: Model) -> Graph:
+        if (ode := as_ode(model)) is not None:
+            return Graph([*ode.x, *ode.extra_inputs], {name: function(ode.x) for name, function in functions.items()})
         system = as_system(model)
         of_energy = energy(system)
-        outputs = {"energy": of_energy.outputs["E"]}
-        outputs |= {name: function(system.q, system.qd) for name, function in others.items()}
-        return cg.simplify(Graph(of_energy.inputs, outputs))
-
-    return graph
-
-
-def conserved_states(**functions: Callable[..., Node]) -> Callable[[Model], Graph]:
-    """Functions of the states of an OdeSystem that do not change."""
-
-    def graph(model: Model) -> Graph:
-        ode = as_ode(model)
-        assert ode is not None
-        return Graph([*ode.x, *ode.extra_inputs], {name: function(ode.x) for name, function in functions.items()})
+        others = {name: function(system.q, system.qd) for name, function in functions.items()}
+        return cg.simplify(Graph(of_energy.inputs, {"energy": of_energy.outputs["E"]} | others))
 
     return graph

@@ -39,7 +39,7 @@ TAYLOR_ORDER, LEAST_ORDER = 22, 4  # of a tolerance of 2^-52, and of large ones
 
 def runge_kutta(tableau: Tableau) -> Method:
     """An explicit Runge-Kutta method: equal steps, or steps by error where the tableau has weights of an estimate."""
-    return Method(tableau.order, partial(explicit_step, tableau), adaptive=bool(tableau.error))
+    return Method(tableau.order, partial(explicit_step, tableau), adaptive=bool(tableau.error), by_rows=True)
 
 
 def _later(file: str, name: str, *given: object, **usual: int) -> Callable[..., Step]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Call, If, Statement, copied
+from cgraph.extend import If, Statement, copied
 
 from .problem import Problem
 from .step import Step, Values, advanced, call, count, each, numbered, stage_time, summed, total, weighted
@@ -18,15 +18,16 @@ from .tableau import RowOfWeights, Tableau, real_stability
 def explicit_step(tableau: Tableau, problem: Problem) -> Step:
     """The step; where the tableau has weights of an estimate, with it: the slope at its end is the next one's first."""
     stages = len(tableau.b)
-    rates, body, dense = [Call(problem.rate, ("x", "t", "p"), ("slope0",))], list[Statement](), list[Statement]()
+    rates, body, dense = problem.evaluation.at("x", "t", "slope0"), list[Statement](), list[Statement]()
     for k in range(1, stages):
         body += [advanced("at", tableau.a[k]), *_slope(problem, k, tableau.c[k], "at")]
     if not tableau.error:
-        return Step(body=[*body, advanced("x_new", tableau.b)], rates=rates)
+        return Step(problem.evaluation.lengths, [*body, advanced("x_new", tableau.b)], rates)
     for k, (c, row) in enumerate(tableau.extra, start=stages + 1):
         dense += [advanced("inside", row), *_slope(problem, k, c, "inside")]
     dense += [_power(k, row) for k, row in enumerate(zip(*tableau.dense, strict=True), start=1)]
     return Step(
+        problem.evaluation.lengths,
         body=[*body, summed(("x", "rounding"), ("x_new", "rounding_new"), tableau.b)],
         rates=rates,
         kept=[copied("rounding_new", "rounding")],
@@ -41,8 +42,8 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
 def _slope(problem: Problem, k: int, c: float, at: str) -> list[Statement]:
     """Register slope{k} at a state and at t + c h, which a rate without t does not need."""
     time = f"{at}_t" if problem.timed else "t"
-    rate = Call(problem.rate, (at, time, "p"), (f"slope{k}",))
-    return [stage_time(time, c), rate] if problem.timed else [rate]
+    rate = problem.evaluation.at(at, time, f"slope{k}")
+    return [stage_time(time, c), *rate] if problem.timed else rate
 
 
 def _power(k: int, weights: RowOfWeights) -> Statement:

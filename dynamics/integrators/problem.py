@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import cgraph as cg
@@ -13,18 +14,20 @@ from cgraph._shared import is_finite, kept_by_first, memo, require_choice
 from cgraph.extend import Builder, topological
 
 from ..equations.constraints.constraint_rank import independent_rows
-from ..equations.constraints.projection import projection
-from ..equations.energies import energy
-from ..equations.equations_of_motion import momentum
+from ..equations.constraints.constraints import projection
+from ..equations.equations_of_motion import energy, momentum
 from ..equations.state_equation import FORMS, normalization, state_inputs, with_multipliers
-from ..equations.substitute import substitute
 from ..systems.arguments import TIME, Parameters, call_user_function
+from ..systems.evaluation import ByRows, Evaluation, evaluation_of, without_graph
+from ..systems.kinematics import substitute
 from ..systems.model import Equations, Model, as_equations
 from ..systems.system import System
 
 if TYPE_CHECKING:
     from .switches import Switches
 
+ROWS = f"{__package__}.rate_by_rows"  # which few motions load
+MOST = 60  # moving bodies, beyond which a motion is stepped by rows
 KEPT_PROBLEMS = 16  # problems that stay for another run, with what was derived from them
 
 
@@ -75,9 +78,14 @@ class Problem:
         return self.parameters if self.switches is None else self.parameters[: -len(self.switches.modes)]
 
     @cached_property
+    def evaluation(self) -> Evaluation:
+        """Statements that evaluate f."""
+        return evaluation_of(self.rate)
+
+    @cached_property
     def timed(self) -> bool:
         """Whether f depends on t."""
-        return reaches(self.rate.outputs.values(), [cg.variable(TIME)])
+        return reaches(self.evaluation.called.outputs.values(), [cg.variable(TIME)])
 
     def bind(self, first: Sequence[str], graph: Graph) -> Graph:
         """The graph over `first`, t and `parameters`, in this order, with the bound inputs built in."""
@@ -92,8 +100,12 @@ class Problem:
         return self.bind(self.states, Graph(list(inputs), dict(zip(quantities, nodes, strict=True))))
 
 
-def derive(model: Model, bound: Mapping[str, float]) -> Problem:
-    """The problem of a model, with these numbers built in; of the last few, the one that was derived before."""
+def derive(model: Model, bound: Mapping[str, float], *, by_rows: bool = False) -> Problem:
+    """The problem of a model, with these numbers built in; of the last few, the one that was derived before.
+
+    by_rows: whether f may be loops over rows, as it is of `Rows`, and of more than MOST bodies without loops whose
+    numbers are known. Raises ValueError for `Rows` where it may not.
+    """
     model = as_equations(model)
     inputs, system = state_inputs(model), model.system
     if system is None:
@@ -103,9 +115,17 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
         equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping, system.lengths)
         equations += (system.velocities, *moving.q_dot, moving.quasi and moving.quasi.normalized, moving.groups)
         equations += (tuple(held.names), held.positions, held.velocities)
+    terms, rows = None if system is None else system.body_terms, None
+    if terms is not None and terms.bodies is not None:
+        given = terms.linearized is not None  # as rows
+        if given and not by_rows:
+            without_graph()
+        if by_rows and (given or len(terms.bodies.moving) > MOST):
+            rows = import_module(ROWS).rows_of(system, bound)
+    equations += () if rows is None else (terms,)
     numbers = tuple([(name, float(value).hex()) for name, value in bound.items()])  # 0.0 and -0.0 stay apart
     key = (*equations, inputs.states, inputs.applied, tuple(inputs.parameters), numbers)
-    return _derived(_Request(key, model, bound))
+    return _derived(_Request(key, model, bound, rows))
 
 
 @dataclass(frozen=True)
@@ -113,6 +133,7 @@ class _Request:
     key: tuple[Any, ...]
     model: Equations = field(compare=False)
     bound: Mapping[str, float] = field(compare=False)
+    rows: Any = field(compare=False)  # that it moves by, or None
 
 
 @memo(KEPT_PROBLEMS)
@@ -126,9 +147,16 @@ def _derived(request: _Request) -> Problem:
         components = [f"coordinate {name!r}" for name in system.coordinates]
         rated = set(system.coordinates)
         components += [f"velocity {'of ' if name in rated else ''}{name!r}" for name in system.velocities]
-    every = (*with_multipliers(model), None if system is None else projection(system))
+    every: tuple[Graph | None, ...]
+    if system is not None and request.rows is not None:
+        pushes = {f"tau{i}": tau + force for i, (tau, force) in enumerate(zip(system.tau, system.forces, strict=True))}
+        every = (Graph(cg.variables([*inputs.states, TIME, *inputs.applied, *inputs.parameters]), pushes), None, None)
+    else:
+        every = (*with_multipliers(model), None if system is None else projection(system))
     rate, multipliers, step = [graph and _bind(graph, inputs.states, parameters, bound) for graph in every]
     assert rate is not None
+    if request.rows is not None:
+        rate = import_module(ROWS).rate_by_rows(request.rows, rate, lambda: derive(model, bound).rate)
     graphs = (rate, normalization(model), step, multipliers)
     return Problem(model, inputs.states, tuple(components), parameters, bound, *graphs, system)
 
@@ -141,7 +169,12 @@ def _bind(graph: Graph, first: Sequence[str], parameters: Sequence[str], bound: 
 @kept_by_first
 def total_energy(problem: Problem) -> Graph | None:
     """The energy E of a mechanical system; None for a first-order system."""
-    return None if problem.system is None else problem.bind(problem.states, energy(problem.system))
+    if (system := problem.system) is None or not isinstance(problem.rate, ByRows):
+        return None if system is None else problem.bind(problem.states, energy(system))
+    by_rows, names = import_module(ROWS), problem.rate.input_names
+    straight = lambda: problem.bind(problem.states, energy(system))  # noqa: E731
+    found: Graph = by_rows.energy_by_rows(by_rows.rows_of(system, problem.bound), names, straight)
+    return found
 
 
 def constraint_rates(problem: Problem) -> Graph | None:

@@ -24,17 +24,23 @@ from ..systems.model import display_names
 from .problem import Problem
 from .switches import Switches
 
-COMPARED = {"less", "less_equal"}
-KINKS = {"abs", "minimum", "maximum"}
-STEPS = {"floor", "ceil", "round"}
+STEPS = {"floor": (1.0, 0.0), "ceil": (-1.0, 0.0), "round": (1.0, 0.5)}  # s floor(s a + offset): s, offset
+PIECES: dict[str, Callable[[Node, Node, Node], Node]] = {  # by the side of a, or of a - b
+    "sign": lambda side, a, b: side,
+    "abs": lambda side, a, b: side * a,
+    "less": lambda side, a, b: 0.5 * (1.0 - side),
+    "less_equal": lambda side, a, b: 0.5 * (1.0 - side),
+    "minimum": lambda side, a, b: cg.where(0.5 * (1.0 - side), a, b),
+    "maximum": lambda side, a, b: cg.where(0.5 * (1.0 - side), b, a),
+}
 TINY = 1e-290  # taken from a pivot, that may be zero where a force begins: shares of such are lost in any case
-SWITCHED = {"sign", "fmod", *COMPARED, *KINKS, *STEPS}
+SWITCHED = {"fmod", *PIECES, *STEPS}
 
 
 @kept_by_first
 def switched(problem: Problem) -> Problem:
     """The problem in modes; the same object where the rate is smooth, or has solvers of its own."""
-    if problem.missing is not None or not any([node.op.name in SWITCHED for node in problem.rate.nodes]):
+    if problem.missing is not None or not any([node.op.name in SWITCHED for node in problem.evaluation.called.nodes]):
         return problem
     reader = _Reader(problem)
     rates = reader.read(list(problem.rate.outputs.values()))
@@ -115,14 +121,11 @@ class _Reader:
 
     def used(self, rates: Sequence[Node]) -> list[_Surface]:
         """Surfaces that rates depend on, or others of these, in the order in which they were read."""
-        reached, waiting = set[Node](), list(rates)
-        by_mode = {surface.mode: surface for surface in self._surfaces.values()}
-        while waiting:
-            for node in topological([waiting.pop()]):
-                if node in by_mode and node not in reached:
-                    reached.add(node)
-                    waiting.append(by_mode[node].gap)
-        return [surface for mode, surface in by_mode.items() if mode in reached]
+        surfaces, reached = [*self._surfaces.values()], set(topological(rates))
+        for surface in reversed(surfaces):  # gaps depend on earlier modes
+            if surface.mode in reached:
+                reached.update(topological([surface.gap]))
+        return [surface for surface in surfaces if surface.mode in reached]
 
     def _piece(self, name: str, args: list[Node]) -> Node | None:
         """The piece of an operation that modes choose; None where it never switches."""
@@ -130,7 +133,7 @@ class _Reader:
             return None
         a, b = args[0], args[-1]
         if name in STEPS:
-            sign, offset = {"floor": (1.0, 0.0), "ceil": (-1.0, 0.0), "round": (1.0, 0.5)}[name]
+            sign, offset = STEPS[name]
             step = self._surface(sign * a + offset, 1.0)
             return None if step is None else sign * step.mode
         if name == "fmod":
@@ -139,16 +142,7 @@ class _Reader:
             step = None if side is None else self._surface(side * quotient, 1.0)
             return None if side is None or step is None else a - b * (side * step.mode)
         side = self._side(a if len(args) == 1 else a - b, is_sign=name == "sign")
-        if side is None:
-            return None
-        if name == "sign":
-            return side
-        if name == "abs":
-            return side * a
-        below = 0.5 * (1.0 - side)
-        if name in COMPARED:
-            return below
-        return cg.where(below, a, b) if name == "minimum" else cg.where(below, b, a)
+        return None if side is None else PIECES[name](side, a, b)
 
     def _side(self, g: Node, *, is_sign: bool = False) -> Node | None:
         """The sign of g as a mode, shared by what is g but for a constant factor; None where it is never zero."""

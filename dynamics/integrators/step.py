@@ -19,6 +19,7 @@ from cgraph.extend import (
     Call,
     Factor,
     FixedPoint,
+    For,
     Map,
     Statement,
     Sum,
@@ -86,7 +87,8 @@ def with_registers(step: Step, own: Mapping[str, int], *more: Statement) -> dict
 
 def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:
     """Number of times that statements evaluate the rate; those inside an iteration count themselves."""
-    return sum(isinstance(each, Call) and each.graph is problem.rate for part in statements for each in part)
+    called = problem.evaluation.called
+    return sum(isinstance(each, Call) and each.graph is called for part in statements for each in part)
 
 
 def call(rule: Rule, *reads: str, **lengths: int) -> Call:
@@ -147,6 +149,8 @@ def lengths_of(statements: Iterable[Statement], known: Mapping[str, int]) -> dic
                 told = dict.fromkeys(unknown, elements)
             elif len(unknown) == 1:
                 told[unknown[0]] = elements * numbers - sum([known[name] for name in names if name in known])
+        elif isinstance(statement, For):  # of a rate
+            told = {name: lengths["x"] for name in statement.changed if name not in known}
         lengths |= {name: max(length, lengths.get(name, 0)) for name, length in told.items()}
     return lengths
 

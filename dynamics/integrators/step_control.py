@@ -43,6 +43,7 @@ class Method:
     step: Callable[..., Step]  # of a problem; with order_at of a problem and an order
     adaptive: bool = False  # whether a run chooses its steps by the estimate of their error
     finest: float = SUM_ROUNDING  # relative tolerance below which a step's own rounding is larger
+    by_rows: bool = False  # whether a step evaluates a rate by `Problem.evaluation` alone
     starts: bool = False  # whether `prepare` limits `next`: no first step is searched for, and rejection starts anew
     order_at: Callable[[float], int] | None = None  # the order for a relative tolerance, at most `order`
 
@@ -88,7 +89,7 @@ def equal(step: Step, problem: Problem) -> Program:
     if step.start:
         body.insert(0, first_pass(*step.start))
         lengths["fresh"] = 1
-    return Program(lengths, body, record=["t", "x"], stop="nonfinite")
+    return Program(lengths, body, record=["t", "x"], stop="nonfinite", shared=problem.evaluation.shared)
 
 
 def registers(problem: Problem) -> dict[str, int]:
@@ -207,7 +208,7 @@ def chosen(step: Step, problem: Problem, *, dense: bool, starts: bool) -> Progra
         body.append(_crossed(problem.switches))
         lengths |= {"margins": len(problem.switches.turns), "beyond": 1}
     record = ["t", "h", "x", *(["t_old", "x_old", *coefficients] if dense else [])]
-    return Program(lengths, body, record, record_if="row", stop="status")
+    return Program(lengths, body, record, record_if="row", stop="status", shared=problem.evaluation.shared)
 
 
 def _crossed(switches: Switches) -> If:
@@ -220,7 +221,7 @@ def _crossed(switches: Switches) -> If:
 def _forgotten(step: Step, problem: Problem) -> list[Statement]:
     """Registers that are 0 before the first trial: those that a step reads before it is sure to write them."""
     first: dict[str, None] = {}
-    written = {*registers(problem)}
+    written = {*registers(problem), *problem.evaluation.lengths}
     before = (*step.start, *step.rates, *step.prepare, *step.body)
     for statement in (*before, *step.error, *step.kept, *(step.handed or ())):
         reads, writes = effects([statement])
@@ -244,8 +245,8 @@ def _hermite(problem: Problem) -> list[Statement]:
         way, first, last = x_new - x, h * rate_before, h * rate_after
         return {"dense1": first, "dense2": 3.0 * way - 2.0 * first - last, "dense3": first + last - 2.0 * way}
 
-    before = Call(problem.rate, ("x", "t", "p"), ("rate_before",))
-    return [before, Call(problem.rate, ("x_new", "t_new", "p"), ("rate_after",)), each(powers)]
+    at = problem.evaluation.at
+    return [*at("x", "t", "rate_before"), *at("x_new", "t_new", "rate_after"), each(powers)]
 
 
 def measured(error: str, m: int) -> list[Statement]:

@@ -39,7 +39,7 @@ def surfaces(model: Model, at: Mapping[str, float], form: str = "velocity") -> l
     def values(graph: cg.Graph, *point: Array) -> Array:
         return np.array(list(graph.evaluate(dict(zip(rate.input_names, np.concatenate(point), strict=True))).values()))
 
-    found, modes = list[Surface](), np.where(floors, 0.0, 1.0)
+    found, names, modes = list[Surface](), list(rate.outputs), np.where(floors, 0.0, 1.0)
     with np.errstate(all="ignore"):
         for _ in range(n):
             gaps = values(switches.gaps, start, modes)
@@ -55,13 +55,8 @@ def surfaces(model: Model, at: Mapping[str, float], form: str = "velocity") -> l
             jump = [values(rate, *each) for each in points]
             kink = [values(slopes[1], *each).reshape(m, m + 1) @ normal for each in points]
             for kind, parts in (("jump", jump), ("kink", kink), ("smooth", [np.zeros(m)] * 4)):
-                changes = dict(zip(rate.outputs, (parts[1] - parts[0]).tolist(), strict=True))
-                size = SMALL * np.abs(parts).max(axis=0)
-                by = {
-                    name: change
-                    for (name, change), most in zip(changes.items(), size, strict=True)
-                    if abs(change) > most
-                }
+                change, most = parts[1] - parts[0], SMALL * np.abs(parts).max(axis=0)
+                by = {names[i]: float(change[i]) for i in np.flatnonzero(np.abs(change) > most).tolist()}
                 if by or kind == "smooth":
                     found.append(Surface(formula, tuple(sorted(g.tags)), kind, by))
                     break

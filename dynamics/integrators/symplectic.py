@@ -37,6 +37,7 @@ from cgraph.extend import (
 
 from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import TIME, new_variables
+from ..systems.kinematics import numbered_graph
 from .problem import Problem, reaches
 from .rate_in_modes import in_modes
 from .step import Step, Values, advanced, call, count, numbered, stage_time, summed, total
@@ -88,7 +89,7 @@ def mechanics(problem: Problem) -> Mechanics:
         velocity = [qd + step for qd, step in zip(system.qd, steps, strict=True)]
 
     def graph(inputs: list[Node], outputs: list[Node]) -> Graph:
-        whole = Graph([*inputs, *system.tau, *system.extra_inputs], {f"{k}": node for k, node in enumerate(outputs)})
+        whole = numbered_graph([*inputs, *system.tau, *system.extra_inputs], outputs)
         return in_modes(problem, problem.bind([str(node.name) for node in inputs], whole))
 
     state = [*system.q, *system.qd]

@@ -9,7 +9,7 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..multibody.builders.planar_arm import planar_links
+from ..multibody.builders import planar_links
 from ..multibody.trees.mechanism import Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
 from .mujoco_module import mujoco

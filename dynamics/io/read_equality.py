@@ -48,7 +48,7 @@ def other_equalities(mj: MjModel) -> list[str]:
     for i in _active(mj):
         if not _is_modelled(mj, i):
             others.setdefault(_kind(mj, i), []).append(i)
-    return [f"equality constraints of the type {kind} ({_names(mj, which)})" for kind, which in others.items()]
+    return [f"equality constraints of the type {kind} ({names_of(mj, which)})" for kind, which in others.items()]
 
 
 def left_of_equalities(mj: MjModel) -> list[str]:
@@ -56,14 +56,15 @@ def left_of_equalities(mj: MjModel) -> list[str]:
     inactive = [i for i in range(mj.neq) if not (mj.eq_active0[i] or disabled(mj, "CONSTRAINT", "EQUALITY"))]
     return present(
         {
-            f"softness of equality constraints ({_names(mj, _modelled(mj))})": _modelled(mj),
-            f"inactive equality constraints ({_names(mj, inactive)})": inactive,
+            f"softness of equality constraints ({names_of(mj, _modelled(mj))})": _modelled(mj),
+            f"inactive equality constraints ({names_of(mj, inactive)})": inactive,
         }
     )
 
 
-def _names(mj: MjModel, which: Sequence[int]) -> str:
-    return listed([mj.equality(i).name or f"number {i}" for i in which])
+def names_of(mj: MjModel, which: Sequence[int], kind: str = "equality") -> str:
+    """Names of equality constraints, or of another kind of elements, such as "tendon", or their numbers."""
+    return listed([getattr(mj, kind)(i).name or f"number {i}" for i in which])
 
 
 def _active(mj: MjModel) -> list[int]:
@@ -88,7 +89,7 @@ def _loop(mj: MjModel, i: int, moving: Sequence[Body], ends: Sequence[tuple[str,
     kind, name = _kind(mj, i), mj.equality(i).name
     if kind in ("joint", "tendon"):
         return _coupling(mj, i, name, moving)
-    held = _sites(mj, i, ends) or _frames(mj, i, ends)
+    held = _frames(mj, i, ends)
     (body, at, turn), (to, to_at, to_turn) = held[::-1] if held[0][0] == WORLD else held
     if body == to:
         raise MechanismError(f"equality constraint {name or f'number {i}'} holds the body {body!r} to itself")
@@ -117,21 +118,14 @@ def _coupled(mj: MjModel, i: int, which: int, moving: Sequence[Body]) -> str | d
     return {moving[j].name: coefficient for j, coefficient in fixed_tendon(mj, which).items()}
 
 
-def _sites(mj: MjModel, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End] | None:
-    """The sites that are held together; None where the constraint is of bodies."""
-    kinds = getattr(mj, "eq_objtype", None)
-    if kinds is None or word_of("Obj", kinds[i]) != "site":
-        return None
-    sites = []
-    for site in (int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])):
-        body, origin = ends[mj.site_bodyid[site]]
-        sites.append((body, origin + mj.site_pos[site], spatial.from_quaternion(mj.site_quat[site])))
-    return sites[0], sites[1]
-
-
 def _frames(mj: MjModel, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End]:
-    """The frames of two bodies that are held together: points, and of a weld the second's axes in the first."""
-    (body, origin), (to, to_origin) = (ends[int(each[i])] for each in (mj.eq_obj1id, mj.eq_obj2id))
+    """The frames of two sites or bodies that are held together: of a weld of bodies the second's axes in the first."""
+    one, other = int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])
+    if hasattr(mj, "eq_objtype") and word_of("Obj", mj.eq_objtype[i]) == "site":
+        (body, origin), (to, to_origin) = (ends[mj.site_bodyid[site]] for site in (one, other))
+        turn, to_turn = (spatial.from_quaternion(mj.site_quat[site]) for site in (one, other))
+        return (body, origin + mj.site_pos[one], turn), (to, to_origin + mj.site_pos[other], to_turn)
+    (body, origin), (to, to_origin) = ends[one], ends[other]
     data, turn = np.array(mj.eq_data[i]), np.eye(3)
     point, computed = data[0:3], spatial.cleaned(data[3:6])
     if _kind(mj, i) == "connect":

@@ -23,7 +23,7 @@ from .contacts import untaken, with_contacts
 from .left_out import listed, present, refused_or_left_out, unused
 from .mjcf_contacts import mjcf_balls
 from .mujoco_module import mujoco, word_of
-from .read_equality import left_of_equalities, other_equalities, read_loops
+from .read_equality import left_of_equalities, names_of, other_equalities, read_loops
 from .smooth_forces import (
     Smooth,
     actuators,
@@ -31,7 +31,7 @@ from .smooth_forces import (
     first_output,
     fixed_tendon,
     gain_and_bias,
-    input_names,
+    input_places,
     inputs,
     is_linear,
     joint_limits,
@@ -40,7 +40,7 @@ from .smooth_forces import (
     single,
 )
 from .source import is_text, path_of, root_of, text_of
-from .stand_ins import zeros_again
+from .write_mjcf import zeros_again
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -76,8 +76,7 @@ def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth) -> Mechanism:
 def _starts(mj: MjModel, moving: Sequence[Body], taken: Mapping[str, float]) -> dict[str, dict[str, float]]:
     """{keyframe: its coordinates, velocities and inputs, by name}."""
     names = [*[f"q.{name}" for name in coordinate_names(moving)], *[f"qd.{name}" for name in velocity_names(moving)]]
-    first = [inputs(mj, i)[0] for i in range(actuators(mj))]
-    ctrl = {name: first[i] for i, name in enumerate(input_names(mj)) if name in taken}
+    ctrl = {name: place for name, place in input_places(mj).items() if name in taken}
     return {
         mj.key(k).name or f"key {k}": dict(
             zip(names, [*mj.key_qpos[k].tolist(), *mj.key_qvel[k].tolist()], strict=True)
@@ -194,7 +193,7 @@ def _not_modelled(mj: MjModel) -> list[str]:
     pulling = [t for t in pulling if not is_linear(mj, t)]
     others = {
         f"springs of free joints, or of turned ball joints ({listed(_joint_names(mj, sprung))})": sprung,
-        f"tendons with a spring, damper or mass ({_tendons(mj, pulling)})": pulling,
+        f"tendons with a spring, damper or mass ({names_of(mj, pulling, 'tendon')})": pulling,
         "springs or dampers that are not linear": _any(mj, *_NOT_LINEAR),
         f"joints with several dampings or armatures ({listed(_joint_names(mj, _uneven(mj)))})": _uneven(mj),
         "actuators with armature or damping": _any(mj, *_OF_AN_ACTUATOR),
@@ -229,9 +228,9 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     others = {
         untaken(takeable): touching and smooth.contacts is None and not disabled(mj, "CONSTRAINT", "CONTACT"),
         f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
-        f"tendon limits ({_tendons(mj, pulling['limits'])})": pulling["limits"] and limited,
+        f"tendon limits ({names_of(mj, pulling['limits'], 'tendon')})": pulling["limits"] and limited,
         f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,
-        f"friction loss of tendons ({_tendons(mj, pulling['loss'])})": pulling["loss"] and rubbing,
+        f"friction loss of tendons ({names_of(mj, pulling['loss'], 'tendon')})": pulling["loss"] and rubbing,
         f"motions of mocap bodies, which stand where the file has them ({listed(mocap)})": mocap,
         f"ranges, or lack, of actuators that balance weight ({listed(_joint_names(mj, balancing))})": balancing,
         f"actuators ({len(acting) - len(servos)})": len(acting) > len(servos),
@@ -251,10 +250,6 @@ def _at_rest(mj: MjModel, i: int) -> str:
     terms += [f"input at {'least' if least > 0.0 else 'most'} {least:g}" for least in nearest if least]
     gear = mj.actuator_gear[first_output(mj, i), 0]
     return " ".join([*terms, *([f"times gear {gear:g}"] if terms and gear != 1.0 else [])])
-
-
-def _tendons(mj: MjModel, which: Sequence[int]) -> str:
-    return listed([mj.tendon(t).name or f"number {t}" for t in which])
 
 
 def _where(mj: MjModel, field: str) -> set[int]:

@@ -12,8 +12,7 @@ import numpy as np
 from cgraph._shared import Array, require_flag
 
 from ..multibody.algebra import spatial
-from ..multibody.bodies.body import moment_rounding
-from ..multibody.bodies.limits import ANYTHING, NO_LIMITS, Limits
+from ..multibody.bodies.body import ANYTHING, NO_LIMITS, Limits, moment_rounding
 from ..multibody.forces.contact import Contact
 from ..multibody.forces.joint_force import JointForce, JointFriction, JointLimit
 from ..multibody.joints import COMPOSITIONS, TYPES
@@ -21,8 +20,8 @@ from ..multibody.loops import Loop
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from .contacts import FRICTION, capsule_ends, untaken, with_contacts
 from .left_out import follows_itself, listed, present, refused_or_left_out, unused
-from .recorded_element import XACRO, Recorded, unread
 from .smooth_forces import Smooth
+from .source import XACRO, Recorded, unread
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
 FAR_LIMIT = 1e9  # in any unit: a limit that is there because URDF asks for one; it stands for none

@@ -15,9 +15,8 @@ from cgraph.extend import Builder, building
 
 from ..multibody.algebra import spatial
 from ..multibody.algebra.spatial import ZERO
-from ..multibody.bodies.body import Body, MechanismError
-from ..multibody.bodies.limits import ANYTHING, Limits
-from ..multibody.forces.external_force import Force
+from ..multibody.bodies.body import ANYTHING, Body, Limits, MechanismError
+from ..multibody.forces.contact import Force
 from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, JointSpring, Range
 from .contacts import Material, asked
 from .mujoco_module import mujoco, word_of
@@ -169,7 +168,7 @@ def mjcf_forces(
         if taken.friction is not None and losses[k] and of and not disabled(mj, "CONSTRAINT", "FRICTIONLOSS"):
             forces.append(JointFriction(of, losses[k], taken.friction))
     if taken.actuators and not disabled(mj, "ACTUATION"):
-        names = input_names(mj)
+        names = list(input_places(mj))
         for i in [i for i in range(actuators(mj)) if modelled(mj, i) and not _switched_off(mj, i)]:
             actuator = _actuator(mj, i, names[i], moving)
             forces += [actuator] if actuator.body else _pushes(mj, i, actuator, ends)
@@ -198,15 +197,15 @@ def _switched_off(mj: MjModel, i: int) -> bool:
     return 0 <= group < 31 and bool(int(mj.opt.disableactuator) >> group & 1)
 
 
-def input_names(mj: MjModel) -> list[str]:
-    """Names of the parameters that control the actuators, all different."""
-    names: list[str] = []
+def input_places(mj: MjModel) -> dict[str, int]:
+    """{name of the parameter that controls an actuator, all different: place of its first input among all}."""
+    places: dict[str, int] = {}
     for i in range(actuators(mj)):
         name = "ctrl_" + (mj.actuator(i).name or str(i)).replace(" ", "_")
-        while name in names:
+        while name in places:
             name += "_"
-        names.append(name)
-    return names
+        places[name] = inputs(mj, i)[0]
+    return places
 
 
 def gain_and_bias(mj: MjModel, i: int) -> tuple[list[float], list[float]]:

@@ -13,7 +13,7 @@ from cgraph import Node
 from cgraph._shared import Array, is_finite
 from cgraph.extend import Builder, building
 
-from ..equations.constraints.nearly_redundant_rows import without_nearly_redundant
+from ..equations.constraints.constraint_rank import without_nearly_redundant
 from ..systems.constraints import ConstraintError, Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple

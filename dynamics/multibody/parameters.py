@@ -11,7 +11,7 @@ from cgraph import Graph, Node
 from cgraph._shared import Array
 from cgraph.extend import as_node, topological
 
-from ..equations.substitute import substitute
+from ..systems.kinematics import substitute
 
 Quantity = float | Node | str  # a number, a node over parameters, or a parameter's name
 Quantities = ArrayLike | Sequence[Quantity] | Sequence[Sequence[Quantity]]
@@ -35,7 +35,7 @@ def entries(value: object) -> list[Any]:
 def names_in(values: Iterable[object]) -> dict[str, None]:
     """Names of the parameters and variables of quantities, in order."""
     result: dict[str, None] = {}
-    for each in values:
+    for each in [each for each in values if type(each) is not float]:
         if isinstance(each, Node):
             result |= {str(node.name): None for node in topological([each]) if node.op.name == "variable"}
         elif isinstance(each, str):

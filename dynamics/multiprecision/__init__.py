@@ -1,7 +1,6 @@
 """Multiprecision: reference trajectories to many digits with a stated error, to measure others against."""
 
-from .reference import reference
-from .solution import Reference
+from .reference import Reference, reference
 from .taylor_integrator import ReferenceFailedError
 
 __all__ = ["Reference", "ReferenceFailedError", "reference"]

@@ -1,17 +1,18 @@
-"""Numbers of any precision: Python's decimal numbers, and the functions of them that mpmath has."""
+"""Decimal numbers of any precision: operations on them, with the functions that mpmath has, and graphs over them."""
 
 from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, localcontext
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from cgraph._shared import install
-from cgraph.extend import Op
+from cgraph import Graph, Node
+from cgraph._shared import columns, install
+from cgraph.extend import Op, topological
 
 if TYPE_CHECKING:
     from mpmath.ctx_mp import MPContext
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 GUARD = 5  # digits more in mpmath
 ARITHMETIC = (operator.add, operator.sub, operator.mul, operator.truediv, operator.neg)
 NAN = Decimal("nan")
+
+Entry = tuple[int, Callable[..., Decimal], list[int]]  # where the result goes, of which function, of the numbers where
 
 
 def working(digits: int) -> AbstractContextManager[Context]:
@@ -63,7 +66,7 @@ def value(op: Op, mp: MPContext) -> Callable[..., Decimal]:
         arithmetic: Callable[..., Any] = op.operator
         return arithmetic
     if op.precise is None and op.piece is not None:
-        return partial(_piece, op.piece)
+        return partial(piece_of, op.piece, sign)
     function = op.precise or op.operator or getattr(mp, op.name, None)
     if function is None:
         raise NotImplementedError(
@@ -80,6 +83,59 @@ def value(op: Op, mp: MPContext) -> Callable[..., Decimal]:
     return by_mpmath
 
 
-def _piece(piece: Callable[[int], tuple[int | None, int]], *args: Decimal) -> Decimal:
-    slot, factor = piece(sign(args[0] - args[1] if len(args) == 2 else args[0]))
+def piece_of(piece: Callable[[int], tuple[int | None, int]], side: Callable[[Decimal], int], *args: Decimal) -> Decimal:
+    """The value of a piecewise operation.  side: of a number that is zero where it switches."""
+    slot, factor = piece(side(args[0] - args[1] if len(args) == 2 else args[0]))
     return Decimal(factor) if slot is None else factor * args[slot]
+
+
+class GraphValues:
+    """A graph over decimal numbers; what its constants alone decide is computed once.
+
+    constants: {name of an input: number}; the other inputs are given in calls.  value_of: the function of a node.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        constants: Mapping[str, object],
+        value_of: Callable[[Node], Callable[..., Decimal]],
+    ) -> None:
+        self._numbers: list[Decimal] = []
+        self._steps: list[Entry] = []
+        places: dict[Node, int] = {}
+        moving: set[int] = set()
+        for node in (*graph.inputs, *topological(graph.outputs.values())):
+            if node in places:
+                continue
+            k = places[node] = len(self._numbers)
+            args = [places[arg] for arg in node.args]
+            known = Decimal(0)  # until a call
+            if node.value is not None:
+                known = number(node.value)
+            elif node.name in constants and not args:
+                known = number(constants[str(node.name)])
+            elif args and moving.isdisjoint(args):
+                known = value_of(node)(*[self._numbers[arg] for arg in args])
+            else:
+                moving.add(k)
+                self._steps += [(k, value_of(node), args)] if args else []
+            self._numbers.append(known)
+        self._inputs = [places[node] for node in graph.inputs if node.name not in constants]
+        self._outputs = [places[node] for node in graph.outputs.values()]
+
+    def __call__(self, inputs: Sequence[Decimal]) -> list[Decimal]:
+        """The outputs, in their order."""
+        numbers = self._numbers
+        for k, each in zip(self._inputs, inputs, strict=True):
+            numbers[k] = each
+        for k, function, args in self._steps:
+            numbers[k] = function(*[numbers[arg] for arg in args])
+        return [numbers[k] for k in self._outputs]
+
+
+def values_in_digits(graph: Graph, inputs: Sequence[float], digits: int) -> list[Decimal]:
+    """The outputs, computed with so many digits. Raises ImportError without mpmath."""
+    mp = mpmath_context(digits)
+    with working(digits):
+        return GraphValues(graph, {}, lambda node: value(columns(node.op), mp))([number(x) for x in inputs])

@@ -6,24 +6,89 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from decimal import Decimal
+from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 from numpy.typing import ArrayLike
 
+import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import atomic_write, require_path
+from cgraph._shared import Array, atomic_write, real_array, require_path
 
 from ..equations.state_equation import state_equation, state_inputs
 from ..equations.states.initial_value import other_inputs, start_state, times_to_record
 from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_equations
 from .decimal_numbers import working
-from .solution import Reference, from_text
 from .taylor_integrator import ReferenceFailedError, taylor
 
 FEWEST, STEP, MOST_DIGITS = 8, 6, 400  # digits of the tolerance: at least, more in each run, and at most
 SPARE = 6  # digits written beyond those asked for
+
+
+@dataclass(frozen=True)
+class Reference:
+    """States at some times, in decimal, as `reference` gives them.
+
+    Parameters
+    ----------
+    t : tuple of float
+        The times, (T,) [s].
+    decimal : tuple of tuple of str
+        States in decimal, (T, m): q and then qd [rad or m, per second], or the states of an OdeSystem.
+    error : float
+        Error bound of `decimal`, relative to the largest value of the same state.
+    how : str
+        The method, and how the error was estimated.
+
+    Examples
+    --------
+    >>> exact = Reference((1.0,), (("0.33333333333333333333",),), 1e-20, "by hand")
+    >>> print(exact.deviation([[1.0 / 3.0]]))
+    [[-1.85003837e-17]]
+    """
+
+    t: tuple[float, ...]
+    decimal: tuple[tuple[str, ...], ...]
+    error: float
+    how: str
+
+    @cached_property
+    def x(self) -> Array:
+        """The states rounded to float64, (T, m)."""
+        return np.array([[float(text) for text in row] for row in self.decimal]).reshape(len(self.t), -1)
+
+    @cached_property
+    def _rest(self) -> Array:
+        """Remainder that the rounding of `x` left out."""
+        rest = [[float(Fraction(text) - Fraction(float(text))) for text in row] for row in self.decimal]
+        return np.array(rest).reshape(self.x.shape)
+
+    def deviation(self, x: ArrayLike) -> Array:
+        """x - reference, (T, m), exact to the last bits of x, where `x - self.x` would end at an ulp of it."""
+        values = real_array("the states", x)
+        if values.shape != self.x.shape:
+            raise ValueError(f"the states must have the reference's shape {self.x.shape}, got {values.shape}")
+        return (values - self.x) - self._rest
+
+    def relative_error(self, x: ArrayLike) -> float:
+        """The largest deviation relative to the largest value of its state; a state that is zero counts as is."""
+        return float(np.max(np.abs(self.deviation(x)) / scale(self.x), initial=0.0))
+
+
+def scale(x: Array) -> Array:
+    """The largest value of each state over the times, (m,); 1 where it is zero throughout."""
+    largest: Array = np.max(np.abs(x), axis=0, initial=0.0)
+    return np.where(largest > 0.0, largest, 1.0)
+
+
+def from_text(t: Sequence[float], rows: Sequence[Sequence[str]], error: float, how: str) -> Reference:
+    """A Reference of plain sequences."""
+    return Reference(tuple(map(float, t)), tuple([tuple(row) for row in rows]), float(error), how)
 
 
 def reference(
@@ -147,7 +212,7 @@ def _differences(a: list[list[Decimal]], b: list[list[Decimal]]) -> list[float]:
     return result
 
 
-FORMAT = 2  # part of the name: count it up when the method changes so that old solutions are not what would be computed
+FORMAT = 3  # part of the name: count it up when the method changes so that old solutions are not what would be computed
 
 
 def key(
@@ -159,19 +224,8 @@ def key(
     digits: int,
 ) -> str:
     """The name of a solution: a hash of the equations by structure, numbers by their bits."""
-    number = {node: i for i, node in enumerate(graph.nodes)}
-    nodes = [
-        (
-            node.op.name,
-            [number[arg] for arg in node.args],
-            None if node.value is None else node.value.hex(),
-            node.name if node.op.name == "variable" else None,
-        )
-        for node in graph.nodes
-    ]
-    rates = [number[node] for node in graph.outputs.values()]
     numbers = [[float(value).hex() for value in row] for row in (start, times, values.values())]
-    content = [FORMAT, nodes, rates, list(states), list(values), numbers, digits]
+    content = [FORMAT, cg.structure_hash(graph), list(states), list(values), numbers, digits]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
+from functools import partial
 from operator import mul
 from typing import TYPE_CHECKING
 
@@ -20,8 +21,7 @@ from cgraph._shared import columns
 from cgraph.extend import NoSeriesError, jets
 
 from ..systems.arguments import TIME
-from .decimal_numbers import log10_size, mpmath_context, number, sign, value, working
-from .graph_values import GraphValues
+from .decimal_numbers import GraphValues, log10_size, mpmath_context, number, piece_of, sign, value, working
 
 if TYPE_CHECKING:
     from mpmath.ctx_mp import MPContext
@@ -56,13 +56,11 @@ class Series:
         k, piece = self._pieces[node], columns(node.op).piece
         assert piece is not None
 
-        def chosen(*args: Decimal) -> Decimal:
-            side = sign(args[0] - args[1] if len(args) == 2 else args[0])
-            self.sides[k] = side = self.forced.get(k, side)
-            slot, factor = piece(side)
-            return Decimal(factor) if slot is None else factor * args[slot]
+        def side(switch: Decimal) -> int:
+            self.sides[k] = self.forced.get(k, sign(switch))
+            return self.sides[k]
 
-        return chosen
+        return partial(piece_of, piece, side)
 
     def expand(self, x: Sequence[Decimal], t: Decimal, order: int) -> list[list[Decimal]]:
         """Coefficients 0 .. order >= 1 of each state, around the state x at time t."""

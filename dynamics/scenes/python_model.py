@@ -113,13 +113,11 @@ def _told(source: str, function: Callable[[], Made]) -> Made:
     """Result of a function of the user's. Raises ValueError, with the line in the source, for an error of its own."""
     try:
         return function()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
+        if isinstance(error, SystemExit) and type(error) is not SystemExit:  # a signal's
+            raise
         if isinstance(error, ModuleNotFoundError) and error.name and f"{source}.".startswith(f"{error.name}."):
             raise ValueError(f"there is no module {error.name!r:.200}") from error
-        raise ValueError(_where(source, error)) from error
-    except SystemExit as error:
-        if type(error) is not SystemExit:  # a signal's
-            raise
         raise ValueError(_where(source, error)) from error
 
 

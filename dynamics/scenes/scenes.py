@@ -19,8 +19,8 @@ from cgraph._shared import nearest, or_nearest, real_array, real_number
 
 from ..io.load import load_at_start
 from ..io.smooth_forces import smooth
-from ..multibody.bodies.limits import NO_LIMITS, Limits
-from ..multibody.builders.planar_arm import planar_arm
+from ..multibody.bodies.body import NO_LIMITS, Limits
+from ..multibody.builders import planar_arm
 from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..systems.model import Model, as_ode, as_system
 from ..systems.ode_system import OdeSystem

@@ -40,12 +40,11 @@ def with_start(scene: Known, start: Start) -> Known:
         if given and scene.mechanism:
             scene = replace(scene, model=replace(scene.mechanism, parameters={**scene.mechanism.parameters, **given}))
         start = {name: value for name, value in named[start].items() if name in _meant(scene)}
-    states = [*scene.coordinates, *(() if scene.ode else scene.velocities)]
     values = [*scene.q, *scene.qd]
     if not isinstance(start, Mapping):
         numbers = real_array("start", start)
         if numbers.shape != (len(values),):
-            shown = ", ".join(_names(scene)[:12]) + (", .." if len(states) > 12 else "")
+            shown = ", ".join(_names(scene)[:12]) + (", .." if len(_names(scene)) > 12 else "")
             raise ValueError(f"the start needs {len(values)} numbers ({shown}), got {numbers.size}")
         values = numbers.tolist()
     else:

@@ -19,6 +19,7 @@ from cgraph import Graph
 from cgraph._shared import Array, kept_by_first
 
 from ..systems.arguments import TIME
+from ..systems.evaluation import evaluation_of
 from .run_options import Span, Steps
 from .stepper import EqualStepper, Stepper
 from .steps.dense_output import StepBlock
@@ -79,6 +80,7 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
 @kept_by_first
 def phases(rate: Graph) -> Graph | None:
     """Phases of waves in time, over the inputs of a rate; None if it has none."""
+    rate = evaluation_of(rate).called
     timed = {node for node in rate.inputs if node.name == TIME}
     for node in rate.nodes:
         if not timed.isdisjoint(node.args):
@@ -190,7 +192,7 @@ class RunEstimate:
         if isinstance(run, EqualStepper) and run.options.estimated and run.control is None and not resetting:
             begin = time.perf_counter()
             t0 = 0.0
-            if not any([node.name == TIME for node in run.program.rate.nodes]):  # the clock, which rounds, is no part
+            if not run.program.timed:  # the clock, which rounds, is no part
                 t0, times = span.t0, None if span.times is None else span.times - span.t0
                 self._span = Span(span.t_end - t0, t_eval=times)
             self._beside = runs_beside(equal_steps(self._span.instants, run.options.step), run.program.order)

@@ -22,6 +22,7 @@ from ..equations.states.initial_value import initial_values, note_start, other_i
 from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
 from ..integrators.rate_in_modes import rows_in_modes, switched
 from ..systems.arguments import parameter_value
+from ..systems.evaluation import ByRows
 from ..systems.model import Model, as_equations
 from .applied_force import Applied, Hold, Tau, with_applied
 from .events.event import Event, EventProgram, event_program
@@ -102,7 +103,8 @@ class Run(HoldsNodes):
         applied = self.applied
         numbers = other_inputs(applied.model, applied.constant, self._values)
         stay = {*self._varied} if applied.controller is None else {*state_inputs(applied.model).applied}
-        problem = derive(applied.model, {name: value for name, value in numbers.items() if name not in stay})
+        bound = {name: value for name, value in numbers.items() if name not in stay}
+        problem = derive(applied.model, bound, by_rows=self._options.integrator.by_rows)
         stepped = switched(in_form(problem, self._form))
         watched = event_program(stepped, self._events) if self._events else None
         return RunEquations(applied, numbers, problem, stepped, watched)
@@ -475,4 +477,6 @@ class RunGraphs(Mapping[str, Graph]):
 def _specialized(graph: Graph, bound: Mapping[str, float]) -> Graph:
     """The graph with those of its inputs built in that have a value."""
     known = {name: value for name, value in bound.items() if name in graph.input_names}
+    if known and isinstance(graph, ByRows):
+        return graph.bound(known)
     return cg.specialize(graph, known) if known else graph

@@ -630,11 +630,6 @@ def first_registers(program: StepProgram, options: Steps) -> dict[str, ArrayLike
     return {**own, "sized": float(options.atol is None), TOLERANCE: np.maximum(options.absolute, SMALLEST_ATOL)}
 
 
-def span_registers(span: Span) -> dict[str, float]:
-    """Registers of a span of chosen steps."""
-    return {"t": span.t0, **start_registers({"t_end": span.t_end, "goal": span.t_end})}
-
-
 def nonfinite(components: Sequence[str], state: Array) -> str:
     """The first component that is not finite, in words; empty if all are."""
     bad = np.flatnonzero(~np.isfinite(state))

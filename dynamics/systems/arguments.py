@@ -139,7 +139,7 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
         raise TypeError(f"{what} must be a function of {names}, got {function!r:.60}")
     signature = inspect.signature(function)
     for chosen, last in ((arguments, "p"), (arguments[:-1], "t")):
-        if _takes(signature, len(chosen)) and not _keeps(signature, len(chosen) - 1, last):
+        if _takes(signature, len(chosen), last):
             break
     else:
         raise TypeError(f"{what} must take {names}, got {signature}")
@@ -167,19 +167,14 @@ def _require_order(what: str, signature: Signature, names: str) -> None:
         raise TypeError(f"{what} must take {names}, in this order, got ({', '.join(given)}){more}")
 
 
-def _takes(signature: Signature, count: int) -> bool:
-    """Whether the function can be called with so many arguments."""
+def _takes(signature: Signature, count: int, last: str) -> bool:
+    """Whether so many arguments fit, of which the last has no default, or is called so: others are values kept."""
     try:
         signature.bind(*[None] * count)
     except TypeError:
         return False
-    return True
-
-
-def _keeps(signature: Signature, place: int, name: str) -> bool:
-    """Whether the function's argument at this place has a default and another name: a value that is kept."""
-    taken = [*signature.parameters.values()][place : place + 1]
-    return any([each.default is not each.empty and each.name != name for each in taken])
+    place = [*signature.parameters.values()][count - 1 : count]
+    return all([each.default is each.empty or each.name == last for each in place])
 
 
 def require_known(what: str, nodes: Iterable[Node], known: Collection[Node], otherwise: str) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from numpy.typing import ArrayLike
 
 from cgraph import Node
+from cgraph._shared import Array
 from cgraph.extend import Builder
 
 BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
@@ -57,9 +58,12 @@ class BodyTerms:
 
     lengths: as of `System`.  surely_regular: each body alone has inertia along the velocities of its joint, so that no
     motion is without.  require_values: raises ValueError for values of parameters with which the bodies cannot be.
+    bodies: the `Mechanism`, or the `Table` of `Rows`.  linearized: of rows alone, A and B at a state and tau.
     """
 
     equations: BodyEquations
     lengths: tuple[float, ...]
     surely_regular: bool
     require_values: Callable[[Mapping[str, ArrayLike]], None]
+    bodies: Any = None
+    linearized: Callable[..., tuple[Array, Array]] | None = None

@@ -85,7 +85,11 @@ class Constraints:
             raise ValueError(f"two constraints have the name {twice[0]!r}")
         self.positions, self.velocities = given.values()
         self.given: list[tuple[Array, float, Mapping[str, float]]] = []
-        self._check()
+        if set(u) & set(topological(self.positions)):
+            raise ValueError("constraints must depend on coordinates, t and parameters alone; see velocity_constraints")
+        for name, row in zip(self.names[len(self.positions) :], self.velocities, strict=True):
+            if set(u) & set(topological(cotangents({row: ONE}, u))):
+                raise ValueError(f"velocity constraint {name!r} must be linear in the velocities")
 
     def __len__(self) -> int:
         return len(self.names)
@@ -119,14 +123,6 @@ class Constraints:
                 raise ValueError(f"constraint {name!r} is the same at all coordinates, so it holds nothing")
             where = "a condition on positions belongs to constraints="
             raise ValueError(f"velocity constraint {name!r} has no velocity in it; {where}")
-
-    def _check(self) -> None:
-        u = set(self.kinematics.u)
-        if u & set(topological(self.positions)):
-            raise ValueError("constraints must depend on coordinates, t and parameters alone; see velocity_constraints")
-        for name, row in zip(self.names[len(self.positions) :], self.velocities, strict=True):
-            if u & set(topological(cotangents({row: ONE}, self.kinematics.u))):
-                raise ValueError(f"velocity constraint {name!r} must be linear in the velocities")
 
 
 def _rows(what: str, given: object) -> dict[str, Node]:

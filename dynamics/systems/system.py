@@ -29,8 +29,7 @@ from .arguments import (
 from .body_terms import BodyTerms
 from .constraints import Constraints
 from .energies import Energies, added, energies, split_by_motion
-from .kinematics import Kinematics, dot
-from .quasi_velocities import QuasiVelocities
+from .kinematics import Kinematics, QuasiVelocities, dot
 
 
 class System(HoldsNodes):

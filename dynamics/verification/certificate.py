@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,16 +15,21 @@ from cgraph._shared import Array, real_number, require_whole
 from cgraph.extend import Builder, cotangents
 
 from ..equations.constraints.constraint_rank import CLEAR
-from ..equations.coriolis import coriolis, require_quadratic
-from ..equations.energies import energy
-from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
+from ..equations.equations_of_motion import (
+    bias,
+    coriolis,
+    energy,
+    forward_dynamics,
+    gravity_force,
+    mass_matrix,
+    require_quadratic,
+)
 from ..equations.formulations.formulations import inverse_dynamics
 from ..equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from ..equations.linearization.linearization import state_space
 from ..equations.mass_matrix.singular_mass_matrix import balanced
 from ..equations.states.evaluate import evaluate
-from ..equations.torque_parts.torque_decomposition import torque_by_joint_motion, torque_by_link
-from ..equations.torque_parts.torque_table import TorqueTable
+from ..equations.torque_parts.torque_table import TorqueTable, torque_by_joint_motion, torque_by_link
 from ..systems.kinematics import ONE, changes, gathered
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -137,8 +141,20 @@ class _Checks:
     def __init__(self, system: System, at: dict[str, Array], t: float, rng: np.random.Generator) -> None:
         self.system, self.at, self.t, self.rng = system, at, t, rng
         self.timed = system.t in system.extra_inputs
-        self.held = Held(system, self.value)
+        self.held, n = Held(system, self.value), system.n
         self.new_rows = np.array([new_rows(system, q, t) for q in at["q"]])
+        self.inverse, self.inertia = inverse_dynamics(system), self.matrix(mass_matrix(system))
+        # |M| times the largest velocity, (N, n, n): size of the terms of dM/dt, which cancel where M is constant
+        self.rate_terms = np.abs(self.inertia) * np.abs(at["qd"]).max(axis=1)[:, None, None]
+        self.admitted = self.held.admitted(self.inertia)  # M of the motions that constraints admit
+        self.moves = bool(self.admitted.shape[-1])
+        rows = zip(system.forces, system.braking(Builder()), strict=True)
+        self.pushed = self.value(self.graph({f"f{i}": force - brake for i, (force, brake) in enumerate(rows)}))
+        self.bias = self.value(bias(system))
+        self.accelerations, multipliers = np.split(self.value(forward_dynamics(system)), [n], axis=1)
+        # size of the terms of M qdd + bias
+        self.driven = (np.abs(self.inertia) @ np.abs(self.accelerations)[..., None])[..., 0] + np.abs(self.bias)
+        self.held_by = self.held.matrix * multipliers[:, None]  # forces of the constraints, one by one, (N, n, m)
 
     def value(self, graph: Graph, **other: ArrayLike | None) -> Array:
         """Outputs, (N, n_out), at the states, some of them replaced."""
@@ -157,63 +173,6 @@ class _Checks:
         x_dot = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
         rates = changes(x_dot | ({system.t: ONE} if self.timed else {}), graph.outputs.values())
         return self.graph(dict(zip(graph.outputs, rates, strict=True)))
-
-    @cached_property
-    def inverse(self) -> Graph:
-        return inverse_dynamics(self.system)
-
-    @cached_property
-    def inertia(self) -> Array:
-        return self.matrix(mass_matrix(self.system))
-
-    @cached_property
-    def rate_terms(self) -> Array:
-        """|M| times the largest velocity, (N, n, n): size of the terms of dM/dt, which cancel where M is constant."""
-        largest: Array = np.abs(self.at["qd"]).max(axis=1)
-        return np.abs(self.inertia) * largest[:, None, None]
-
-    @cached_property
-    def admitted(self) -> Array:
-        """M of the motions that constraints admit."""
-        return self.held.admitted(self.inertia)
-
-    @property
-    def moves(self) -> bool:
-        """Whether the constraints admit a motion."""
-        return bool(self.admitted.shape[-1])
-
-    @cached_property
-    def bias(self) -> Array:
-        return self.value(bias(self.system))
-
-    @cached_property
-    def gravity(self) -> Array:
-        return self.value(gravity_force(self.system))
-
-    @cached_property
-    def pushed(self) -> Array:
-        """Applied forces less damping."""
-        rows = zip(self.system.forces, self.system.braking(Builder()), strict=True)
-        return self.value(self.graph({f"f{i}": force - brake for i, (force, brake) in enumerate(rows)}))
-
-    @cached_property
-    def accelerations(self) -> Array:
-        return self._solved[:, : self.system.n]
-
-    @cached_property
-    def _solved(self) -> Array:
-        """qdd, and the multipliers of constraints."""
-        return self.value(forward_dynamics(self.system))
-
-    @cached_property
-    def _driven(self) -> Array:
-        """Size of the terms of M qdd + bias."""
-        return (np.abs(self.inertia) @ np.abs(self.accelerations)[..., None])[..., 0] + np.abs(self.bias)
-
-    @cached_property
-    def held_by(self) -> Array:
-        """Forces of the constraints, one by one, (N, n, m)."""
-        return self.held.matrix * self._solved[:, None, self.system.n :]
 
     def always(self) -> Iterator[Residual]:
         """Residuals of every Lagrangian."""
@@ -243,8 +202,8 @@ class _Checks:
         matrix = self.matrix(coriolis(self.system))
         qd = self.at["qd"]
         terms = (np.abs(matrix) + self.rate_terms) @ np.abs(qd)[..., None]
-        force = (matrix @ qd[..., None])[..., 0]
-        off, size = force + self.gravity - self.bias, terms[..., 0] + np.abs(self.gravity)
+        force, gravity = (matrix @ qd[..., None])[..., 0], self.value(gravity_force(self.system))
+        off, size = force + gravity - self.bias, terms[..., 0] + np.abs(gravity)
         yield rounded("coriolis: C qd + gravity = bias", off, size)
         if self.moves and not self.timed:
             rate = self.matrix(self.rate(mass_matrix(self.system)))
@@ -272,7 +231,7 @@ class _Checks:
 
     def _forward(self) -> Residual:
         tau, qdd = self.at["tau"], self.accelerations
-        terms = self._driven + np.abs(tau)
+        terms = self.driven + np.abs(tau)
         equation = "inverse dynamics of forward dynamics = tau" + " + J^T lambda" * self.held.any
         held, terms = self.held_by.sum(axis=-1), terms + np.abs(self.held_by).sum(axis=-1)
         return rounded(equation, self.value(self.inverse, qdd=qdd) - tau - held, terms)
@@ -287,7 +246,7 @@ class _Checks:
             (slope,) = cotangents({system.lagrangian: ONE}, [system.t])
             power = np.concatenate([power, -self.value(self.graph({"dL/dt": slope}))], axis=-1)
             equation += " - dL/dt"
-        terms = np.abs(qd) * (np.abs(self.held_by).sum(axis=-1) + self._driven)
+        terms = np.abs(qd) * (np.abs(self.held_by).sum(axis=-1) + self.driven)
         total = np.abs(power).sum(axis=-1) + terms.sum(axis=-1)
         return rounded(equation, (gained - power.sum(axis=-1))[:, None], total[:, None])
 

@@ -11,8 +11,7 @@ from cgraph import Graph
 from cgraph._shared import Array
 from cgraph.extend import Builder, cotangents
 
-from ..equations.constraints.constraint_rank import CLEAR
-from ..equations.constraints.nearly_redundant_rows import least_new
+from ..equations.constraints.constraint_rank import CLEAR, least_new
 from ..equations.states.consistent_state import nearest_state
 from ..systems.constraints import ConstraintError
 from ..systems.kinematics import ONE, changes

@@ -20,15 +20,15 @@ from ..equations.states.evaluate import evaluate
 from ..io.load import compiled
 from ..io.mujoco_module import mujoco
 from ..io.mujoco_twin import MujocoTwin, joint_order
-from ..io.smooth_forces import input_names, inputs
+from ..io.smooth_forces import input_places
 from ..multibody.bodies.body import MechanismError
-from ..multibody.changes.switched_effects import without_effect
-from ..multibody.forces.external_force import Force
+from ..multibody.changes.pruning import without_effect
+from ..multibody.forces.contact import Force
 from ..multibody.forces.joint_force import Actuator, JointSpring
 from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..multibody.trees.structure import changed
 from ..systems.model import Model
-from .pinocchio_bodies import PinocchioBodies, constrained_accelerations
+from .pinocchio_model import PinocchioBodies, constrained_accelerations
 from .residual import PEERS, PROXIMAL, Residual, UnavailableError
 
 if TYPE_CHECKING:
@@ -201,9 +201,13 @@ def explanation(model: Mechanism, peer: Translation | Original, at: Mapping[str,
 
 def disagreement(model: Mechanism, peer: Translation | Original, at: Mapping[str, Array]) -> float:
     """The largest difference of the torques, relative to the largest torque of its state; over all states."""
-    ours = evaluate(model, inverse_dynamics(model), at)
+    return _off(evaluate(model, inverse_dynamics(model), at), peer.inverse(at))
+
+
+def _off(ours: Array, theirs: Array) -> float:
+    """The largest difference of rows (N, n), relative to the largest of ours in its row."""
     size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
-    return float(np.max(np.abs(ours - peer.inverse(at)).max(axis=1) / size))
+    return float(np.max(np.abs(ours - theirs).max(axis=1) / size))
 
 
 def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], list[str]]:
@@ -213,7 +217,7 @@ def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], l
     """
     said = ["MuJoCo: its equality constraints are soft, so that it is compared without the loops"]
     try:
-        bodies = _without_forces(model)
+        bodies = bare(model, loops=True)
     except UnavailableError as error:
         return [], [f"MuJoCo and Pinocchio with constraints: {error}"]
     try:
@@ -221,28 +225,22 @@ def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], l
     except (ImportError, UnavailableError) as error:
         return [], [*said, f"Pinocchio's constraintDynamics: {error}"]
     ours = evaluate(bodies, forward_dynamics(bodies), at)[:, : theirs.shape[1]]
-    size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
-    value = float(np.max(np.abs(ours - theirs).max(axis=1) / size))
-    return [Residual("forward dynamics with loops = Pinocchio's constraintDynamics", value, PROXIMAL)], said
+    equation = "forward dynamics with loops = Pinocchio's constraintDynamics"
+    return [Residual(equation, _off(ours, theirs), PROXIMAL)], said
 
 
-def bare(model: Model, kept: Sequence[type] = ()) -> Mechanism:
-    """The tree of `_without_forces`, as its loops are no part of inverse dynamics."""
-    bodies = _without_forces(model, kept)
-    return replace(bodies, loops=()) if bodies.loops else bodies
-
-
-def _without_forces(model: Model, kept: Sequence[type] = ()) -> Mechanism:
+def bare(model: Model, kept: Sequence[type] = (), *, loops: bool = False) -> Mechanism:
     """The mechanism of a model, with parameters as numbers, and of forces, which peers do not have, those `kept`.
 
-    Raises UnavailableError for another model.
+    loops: whether it has them; they are no part of inverse dynamics. Raises UnavailableError for another model.
     """
     bodies = as_mechanism(model)
     if bodies is None:
         raise UnavailableError("takes rigid bodies, not a Lagrangian")
     bodies = bodies.bind()
     forces = [force for force in bodies.forces if isinstance(force, tuple(kept))]
-    return changed(bodies, forces=forces) if bodies.forces else bodies
+    bodies = changed(bodies, forces=forces) if bodies.forces else bodies
+    return bodies if loops or not bodies.loops else replace(bodies, loops=())
 
 
 def _translated(make: Callable[[Mechanism], Original | PinocchioBodies], model: Model) -> Translation:
@@ -259,16 +257,15 @@ def original(twin: Source, model: Model) -> Original:
     of rigid bodies.
     """
     module, theirs = mujoco(), copy.copy(compiled(twin))
-    ctrl, called = np.random.default_rng(0).normal(size=theirs.nu), input_names(theirs)
-    at = [inputs(theirs, i)[0] for i in range(len(called))]
+    ctrl, named = np.random.default_rng(0).normal(size=theirs.nu), input_places(theirs)
     given = as_mechanism(model)
     known = given.parameter_values if given else {}
-    taken = {name: float(ctrl[k]) for name, k in zip(called, at, strict=True) if name in known}
+    taken = {name: float(ctrl[k]) for name, k in named.items() if name in known}
     try:
         bodies = bare(given.bind(taken) if given else model, (Actuator, JointSpring, Force))
     except UnavailableError as error:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
-    for i in [i for i, name in enumerate(called) if name not in taken]:
+    for i in [i for i, name in enumerate(named) if name not in taken]:
         theirs.actuator_gaintype[i] = theirs.actuator_biastype[i] = theirs.actuator_dyntype[i] = 0
         theirs.actuator_gainprm[i], theirs.actuator_biasprm[i] = 0.0, 0.0
     loops = getattr(as_mechanism(model), "loops", ())

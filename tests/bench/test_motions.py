@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from pytest import approx
 
-from dynamics.experiments.work_precision.measurement import Entry, Tried
-from dynamics.experiments.work_precision.trajectory_runs import Outcome, Run, problem_of
+from dynamics.experiments.work_precision.measurement import Entry, Outcome, Run, Tried, problem_of
 from dynamics.multiprecision import Reference
 from tests.bench.motions.motion_runs import HeyokaBatch, Many, Motion
 from tests.bench.motions.motion_scenes import MOTIONS, TIMES, exact_end, sizes

@@ -30,26 +30,29 @@ def placed(mechanism: dyn.Mechanism, q: Array, qd: Array) -> dict[str, Placed]:
     for body, x, rate in zip(mechanism.bodies, q, qd, strict=True):
         on = found[body.parent]
         axis = np.asarray(body.joint.axis) / np.linalg.norm(body.joint.axis)
-        arm, along = on.axes @ np.asarray(body.joint.position), on.axes @ axis
+        axes, arm = on.axes @ np.asarray(body.joint.orientation), on.axes @ np.asarray(body.joint.position)
+        along = axes @ axis
         if body.joint.kind == "prismatic":
             arm = arm + x * along
             speed = on.speed + np.cross(on.spin, arm) + rate * along
-            found[body.name] = Placed(on.axes, on.origin + arm, on.spin, speed)
+            found[body.name] = Placed(axes, on.origin + arm, on.spin, speed)
         else:
             speed = on.speed + np.cross(on.spin, arm)
-            found[body.name] = Placed(on.axes @ turn(axis, x), on.origin + arm, on.spin + rate * along, speed)
+            found[body.name] = Placed(axes @ turn(axis, x), on.origin + arm, on.spin + rate * along, speed)
     return found
 
 
 def energies(mechanism: dyn.Mechanism, q: Array, qd: Array) -> tuple[float, float]:
+    """The kinetic energy, of armatures, too, and that of weight."""
     kinetic = potential = 0.0
     parts = placed(mechanism, q, qd)
-    for body in mechanism.bodies:
+    for body, rate in zip(mechanism.bodies, qd, strict=True):
         part, given = parts[body.name], np.asarray(body.inertia)
         inertia = part.axes @ (np.diag(given) if given.shape == (3,) else given) @ part.axes.T
         arm = part.axes @ np.asarray(body.center)
         speed = part.speed + np.cross(part.spin, arm)
         kinetic += 0.5 * body.mass * speed @ speed + 0.5 * part.spin @ inertia @ part.spin
+        kinetic += 0.5 * body.joint.armature * rate**2
         potential -= body.mass * np.asarray(mechanism.gravity) @ (part.origin + arm)
     return float(kinetic), float(potential)
 

@@ -1,4 +1,4 @@
-"""Linkages for tests: four-bars, a slider-crank and Andrews' squeezer."""
+"""Linkages for tests: four-bars, Peaucellier's linkage and Andrews' squeezer."""
 
 from functools import cache
 from typing import Any
@@ -18,18 +18,6 @@ def bar(name: str, parent: str, length: float, place: Any, mass: float = 1.0, ki
     return dyn.Body(name, joint, parent, mass, (0.5 * length, 0.0, 0.0), (0.0, inertia, inertia))
 
 
-def scaled_four_bar(length: float, mass: float) -> dyn.Mechanism:
-    """The four-bar with all lengths and masses so many times larger."""
-    sizes = {"crank": 0.3 * length, "coupler": 0.8 * length, "rocker": 0.6 * length}
-    places = {"crank": 0.0, "coupler": sizes["crank"], "rocker": 0.9 * length}
-    bars = [
-        bar(name, "crank" if name == "coupler" else "world", size, (places[name], 0, 0), mass)
-        for name, size in sizes.items()
-    ]
-    loop = dyn.Loop("point", "coupler", "rocker", at=(sizes["coupler"], 0, 0), to_at=(sizes["rocker"], 0, 0))
-    return dyn.Mechanism(bars, (0.0, 0.0, -9.81 * length), loops=[loop])
-
-
 @cache
 def peaucellier() -> dyn.Mechanism:
     """Peaucellier's linkage: long bars of 0.5 m from the world, a rhombus of 0.2 m, and a crank of 0.3 m at 0.3 m."""
@@ -43,18 +31,13 @@ def peaucellier() -> dyn.Mechanism:
 
 
 @cache
-def four_bar(kind: str = "point", *, cut: int = 3) -> dyn.Mechanism:
-    """Bars of 0.3, 0.8 and 0.6 m on hinges 0.9 m apart, closed between the second and the third, or at the ground."""
-    loop = dyn.Loop(kind, "coupler", "rocker", at=(0.8, 0, 0), to_at=(0.6, 0, 0), axis=ACROSS, to_axis=ACROSS)
-    bars = [bar("crank", "world", 0.3, (0, 0, 0)), bar("coupler", "crank", 0.8, (0.3, 0, 0))]
-    if cut == 3:
-        bars.append(bar("rocker", "world", 0.6, (0.9, 0, 0)))
-    else:  # the rocker hangs on the coupler, by its other end
-        inertia = 0.6**2 / 12.0
-        joint = dyn.Joint("revolute", ACROSS, (0.8, 0, 0))
-        bars.append(dyn.Body("rocker", joint, "coupler", 1.0, (-0.3, 0, 0), (0.0, inertia, inertia)))
-        loop = dyn.Loop(kind, "rocker", at=(-0.6, 0, 0), to_at=(0.9, 0, 0), axis=ACROSS, to_axis=ACROSS)
-    return dyn.Mechanism(bars, loops=[loop])
+def four_bar(kind: str = "point", length: float = 1.0, mass: float = 1.0) -> dyn.Mechanism:
+    """Bars of 0.3, 0.8 and 0.6 of a length on hinges 0.9 apart, closed between the second and the third."""
+    crank, coupler, rocker = 0.3 * length, 0.8 * length, 0.6 * length
+    bars = [bar("crank", "world", crank, (0, 0, 0), mass), bar("coupler", "crank", coupler, (crank, 0, 0), mass)]
+    bars.append(bar("rocker", "world", rocker, (0.9 * length, 0, 0), mass))
+    ends: dict[str, Any] = {"at": (coupler, 0, 0), "to_at": (rocker, 0, 0), "axis": ACROSS, "to_axis": ACROSS}
+    return dyn.Mechanism(bars, (0.0, 0.0, -9.81 * length), loops=[dyn.Loop(kind, "coupler", "rocker", **ends)])
 
 
 @cache

@@ -12,6 +12,7 @@ import dynamics as dyn
 from dynamics import Body, Joint, Mechanism
 from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.bodies.joint_coordinates import places
+from dynamics.multibody.joints import TYPES
 from dynamics.multibody.trees.mechanism import WORLD
 from tests.slow import slow
 
@@ -112,8 +113,9 @@ def random_tree(seed: int, n: int, among: Sequence[str] = TREE_KINDS, base: str 
     for i in range(n):
         kind = str(base or "revolute") if i == 0 else str(rng.choice(kinds))
         parent = f"b{rng.integers(max(0, i - reach), i)}" if i else WORLD
-        sprung = {"stiffness": 0.0, "spring_reference": 0.0} if kind in ("ball", "free", "free (body axes)") else {}
-        others = sprung | ({"armature": 0.0} if kind in ("free (body axes)", "fixed") else {})
+        own = TYPES.get(kind, TYPES["revolute"])  # of a composed joint, that of its parts
+        others: dict[str, object] = {} if own.sprung and kind != "ball" else {"stiffness": 0.0, "spring_reference": 0.0}
+        others |= {} if own.geared and own.moves else {"armature": 0.0}
         if kind in ("universal", "planar"):
             others["axis"], others["second_axis"] = random_rotation(rng)[:2]
         bodies.append(random_body(f"b{i}", kind, parent, rng, joint=random_joint(kind, rng, **others)))

@@ -1,6 +1,6 @@
-"""Random models and states for the tests of mechanics, and arrays in and out of graphs by coordinate."""
+"""Random models and states for the tests of mechanics, arrays in and out of graphs by coordinate, and ensembles."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 import cgraph as cg
 import dynamics as dyn
 from dynamics import as_system
+from dynamics.systems.model import Model, as_ode
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -27,6 +28,25 @@ def states(model: Any, count: int, seed: int = 0) -> dict[str, Any]:
     result: dict[str, Any] = {"q": rng.uniform(-3.0, 3.0, (count, system.n))}
     result |= {name: rng.uniform(-0.9, 0.9, (count, system.n)) for name in ("qd", "qdd", "tau")}
     return result | {"t": 0.7} | {name: rng.uniform(0.5, 1.5) for name in system.parameters}
+
+
+def split_state(model: Model, x: Sequence[float]) -> tuple[Sequence[float], Sequence[float] | None]:
+    """A state (m,) as the arguments q and qd; of an OdeSystem the state and None."""
+    nq = len(model.coordinates)
+    return (x, None) if as_ode(model) is not None else (x[:nq], x[nq:])
+
+
+def arms(count: int, n: int = 2) -> tuple[dyn.Mechanism, Array, Array]:
+    """An arm and starts of an ensemble."""
+    rng = np.random.default_rng(count)
+    return random_arm(n), rng.uniform(-2.0, 2.0, (count, n)), rng.normal(size=(count, n))
+
+
+def same(a: dyn.Ensemble, b: dyn.Ensemble) -> bool:
+    """To the last bit, NaN included."""
+    arrays = [(x.t, x.q, x.qd, x.stats.steps, x.stats.nfev, x.stats.rejected, x.stats.dt) for x in (a, b)]
+    equal = all(np.array_equal(x, y, equal_nan=True) for x, y in zip(*arrays, strict=True))
+    return equal and a.stats.message == b.stats.message
 
 
 def at(state: Mapping[str, Any], row: int) -> dict[str, Any]:

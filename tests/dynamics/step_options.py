@@ -1,4 +1,4 @@
-"""Step options: a length of step, and a tolerance, as the arguments that a method takes them by; and all methods."""
+"""Step options: a length of step, and a tolerance, as the arguments that a method takes them by; kinds of methods."""
 
 from typing import Any
 
@@ -6,6 +6,8 @@ from dynamics import METHODS
 from dynamics.integrators.tableau import COMPOSITIONS
 from tests.slow import slow
 
+ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
+EQUAL = [name for name in METHODS if name not in ADAPTIVE]
 # Compositions differ in their coefficients alone: of those a short and a long one, for what holds of every method.
 LIKE_OTHERS = [name for name in COMPOSITIONS if name not in ("yoshida4", "kahan_li6")]
 EVERY_METHOD = [*[name for name in METHODS if name not in LIKE_OTHERS], *slow(*LIKE_OTHERS)]

@@ -19,10 +19,7 @@ def velocity(position: Sequence[Node], q: Sequence[Node], qd: Sequence[Node], t:
 def kinetic(mass: float, position: Sequence[Node], q: Sequence[Node], qd: Sequence[Node], t: Node) -> Node:
     """m v^2 / 2."""
     v = velocity(position, q, qd, t)
-    total = v[0] ** 2
-    for part in v[1:]:
-        total = total + part**2
-    return 0.5 * mass * total
+    return 0.5 * mass * sum([part**2 for part in v[1:]], v[0] ** 2)
 
 
 def points(
@@ -33,9 +30,7 @@ def points(
     def lagrangian(q, qd, t):
         at = places(q, t)
         terms = [kinetic(m, r, q, qd, t) - m * G * r[-1] for m, r in zip(masses, at, strict=True)]
-        total = terms[0]
-        for term in terms[1:]:
-            total = total + term
+        total = sum(terms[1:], terms[0])
         return total if more is None else total - more(q, t)
 
     return dyn.System(lagrangian, [f"x{i}" for i in range(n)])

@@ -6,7 +6,7 @@ from typing import Any
 import mpmath
 from mpmath import mp, mpf
 
-from dynamics.multiprecision.solution import Reference, from_text
+from dynamics.multiprecision.reference import Reference, from_text
 
 DIGITS = 30  # of the texts; the stated error is 10^-DIGITS
 GUARD = 40  # more digits in the arithmetic: a phase of 10^15 rad, or a modulus next to 1, costs some of them

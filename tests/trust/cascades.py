@@ -78,7 +78,8 @@ class Balls:
         t, pull, size = Fraction(self.t_end), Fraction(self.pull), Fraction(self.size)
         shifts = [Fraction(0) if self.alone else i * size for i in range(len(self.x))]
         states = [
-            _free(Fraction(x) - shift, Fraction(v), t, pull) for x, v, shift in zip(self.x, self.v, shifts, strict=True)
+            (Fraction(x) - shift + Fraction(v) * t + pull * t * t / 2, Fraction(v) + pull * t)
+            for x, v, shift in zip(self.x, self.v, shifts, strict=True)
         ]
         if self.walls:
             low, high = (Fraction(wall) for wall in self.walls)
@@ -100,10 +101,6 @@ def _wall(i: int, place: float, side: float) -> Event:
         return q, [-v if k == i else v for k, v in enumerate(qd)]
 
     return Event(f"wall {i} {side:g}", lambda q, qd, t: side * (q[i] - place), -1, reset=turned)
-
-
-def _free(x: Fraction, v: Fraction, t: Fraction, pull: Fraction) -> tuple[Fraction, Fraction]:
-    return x + v * t + pull * t * t / 2, v + pull * t
 
 
 def _folded(x: Fraction, v: Fraction, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:

@@ -44,8 +44,7 @@ def potential(rng: np.random.Generator, name: str) -> AccuracyTask:
 def curved(rng: np.random.Generator, name: str) -> AccuracyTask:
     """A mass matrix that depends on q, A + sum_k w_k w_k^T (1 + sin(k . q)) / 2, in a potential."""
     n = _size(rng)
-    lagrangian = _curved(rng, n)
-    return _task(name, lagrangian, *_start(rng, n))
+    return _task(name, _curved(rng, n), *_start(rng, n))
 
 
 @family

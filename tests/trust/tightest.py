@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cgraph._shared import Array
-from dynamics.experiments.work_precision.measurement import Tried, time_in_turns
-from dynamics.experiments.work_precision.trajectory_runs import Ours, Solver, problem_of
+from dynamics.experiments.work_precision.measurement import Ours, Solver, Tried, problem_of, time_in_turns
 from tests.bench.motions.trajectory_peers import EPSILON, Heyoka
 from tests.bench.tables import Table
 from tests.trust.random_motions import LAGRANGIANS, random_task

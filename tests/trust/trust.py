@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,10 +13,10 @@ import cgraph as cg
 from cgraph._shared import Array
 from cgraph.extend import NoSeriesError
 from dynamics.experiments.accuracy_task import AccuracyTask
-from dynamics.experiments.work_precision.trajectory_runs import problem_of
+from dynamics.experiments.work_precision.measurement import problem_of
 from dynamics.integrators import METHODS
 from dynamics.multiprecision import Reference, ReferenceFailedError
-from dynamics.multiprecision.solution import from_text
+from dynamics.multiprecision.reference import from_text
 from dynamics.simulation.run_options import METHOD, Steps
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import Trajectory
@@ -148,15 +148,6 @@ def _excess(task: AccuracyTask, truth: Answer, run: Trajectory) -> float:
     return float(np.max(relative) / (tolerance * truth.growth))
 
 
-def verdicts(
-    numbers: Iterable[int] = range(COUNT), methods: Sequence[str | None] = (None, *ADAPTIVE)
-) -> Iterator[Verdict]:
-    """The verdicts on these random motions by these methods; None is the default."""
-    for number in numbers:
-        for method in methods:
-            yield judge(number, method)
-
-
 def trust(count: int = COUNT) -> Iterator[Table | str]:
     """The verdicts counted by method, and in words those that are not right."""
     right = f"right to {SLACK:g}, where forces jump to {JUMPS:g}"
@@ -166,7 +157,8 @@ def trust(count: int = COUNT) -> Iterator[Table | str]:
         "largest": lambda chosen, ends: f"{max(ends):.2g}",
         "seconds": lambda chosen, ends: f"{sum(each.seconds for each in chosen):.2f}",
     }
-    yield from counted(title, list(verdicts(range(count))), figures)
+    judged = [judge(number, method) for number in range(count) for method in (None, *ADAPTIVE)]
+    yield from counted(title, judged, figures)
 
 
 def counted(

@@ -4,7 +4,6 @@ import errno
 import json
 import os
 import re
-import shutil
 import subprocess
 import sys
 from importlib import import_module
@@ -271,39 +270,6 @@ def test_the_version_is_one(capsys):
     assert capsys.readouterr().out == f"cgraph {cg.__version__}\n"
     assert viz.__version__ == dyn.__version__ == cg.__version__
     assert re.fullmatch(r"\d+\.\d+\.\d+\S*", cg.__version__)
-
-
-@each_row(
-    ("line", "expected"),
-    [
-        ("cgraph insp", {"inspect"}),
-        ("cgraph draw trip", {"triple_pendulum"}),
-        ("cgraph draw chain --coll", {"--collapse"}),
-        ("cgraph lint chain --formulation chain", {"chain_rule", "chain_rule_literal"}),
-        ("cgraph completion ", {"bash", "zsh", "fish"}),
-    ],
-)
-def test_bash_completes(capsys, line, expected):
-    assert cli.main(["completion", "bash"]) == 0
-    script = capsys.readouterr().out
-    words = line.split(" ")
-    program = (
-        f'{script}\nCOMP_WORDS=({" ".join(words[:-1])} "{words[-1]}"); COMP_CWORD={len(words) - 1}\n_shtab_cgraph\n'
-    )
-    done = subprocess.run(
-        ["bash", "-c", f'{program}printf "%s\\n" "${{COMPREPLY[@]}}"'], capture_output=True, text=True, check=True
-    )
-    assert (set(done.stdout.split()), done.stderr) == (expected, "")
-
-
-@pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_every_command_and_option_is_in_the_completion(capsys, shell):
-    assert cli.main(["completion", shell]) == 0
-    script = capsys.readouterr().out
-    for word in (*COMMANDS, "--formulation", "--collapse", "chain_rule_literal", "triple_pendulum"):
-        assert word.removeprefix("--") in script
-    if shutil.which(shell):
-        subprocess.run([shell, "-n", "-c", script], check=True)
 
 
 def test_words_of_a_list_may_stand_between_options():

@@ -55,7 +55,7 @@ def test_an_example_ends_with_its_status(
     assert status != cli.ERROR or not [*here.iterdir()]
 
 
-@pytest.mark.parametrize("arguments", ["completion bash", "why chain tau0 q9 --k 2000"], ids=["short", "long"])
+@pytest.mark.parametrize("arguments", ["equations spring_mass", "why chain tau0 q9 --k 2000"], ids=["short", "long"])
 def test_a_reader_who_leaves_ends_the_command_without_a_word(
     arguments: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -111,10 +111,10 @@ def test_a_full_disk_is_an_error_in_one_line(
 ) -> None:
     with Path("/dev/full").open("w") as output:
         monkeypatch.setattr(sys, "stdout", output)
-        assert cli.main(["completion", "bash"]) == cli.ERROR
+        assert cli.main(["equations", "spring_mass"]) == cli.ERROR
     assert capsys.readouterr().err == "cgraph: error: No space left on device\n"
 
 
 def test_a_closed_output_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdout", None)
-    assert cli.main(["completion", "bash"]) == cli.SUCCESS
+    assert cli.main(["equations", "spring_mass"]) == cli.SUCCESS

@@ -39,7 +39,3 @@ def test_no_role_and_no_tag_has_the_color_of_the_spurious() -> None:
 def test_link_10_comes_after_link_9() -> None:
     tags = ["link 10", "link 9", "base", "link 1"]
     assert sorted(tags, key=theme.natural_order) == ["base", "link 1", "link 9", "link 10"]
-
-
-def test_tag_colors_depend_on_the_set_of_tags_alone() -> None:
-    assert theme.tag_colors(["b", "a", "c"]) == theme.tag_colors(["c", "b", "a", "a"])

@@ -1,7 +1,8 @@
-"""Panels of an animation: moving sticks, and curves over time, side by side, as artists of matplotlib."""
+"""Panels of an animation: sticks among spheres and planes, and curves over time, as artists of matplotlib."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,7 +13,6 @@ from cgraph._shared import Array
 
 from .. import theme
 from ..plots.plot import empty_figure, style, to_gif
-from .surfaces import grid, surfaces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +27,8 @@ TRACE = RATE * FRAME_ROWS  # instants that the tip's way is shown for
 NAMED = 7  # curves at most
 SMALLEST = 1e-300  # what float64 has room for, with a product to spare
 CURVE_ROUNDING = 1e-12  # of the largest value of a curve: a change that is none
+EDGE_ON = 0.05  # of a plane's square: how little of it is seen where a line stands for the plane
+_RING = np.linspace(0.0, 2.0 * np.pi, 49)
 BREAK = np.full((1, 2), np.nan)  # between lines that are one artist
 
 
@@ -226,3 +228,43 @@ def _nice(length: float) -> float:
     """The largest of 1, 2 and 5 times a power of ten up to a length."""
     power = float(10.0 ** np.floor(np.log10(length)))
     return max(each * power for each in (1.0, 2.0, 5.0) if each * power <= length * (1.0 + 1e-12))
+
+
+class Lines(NamedTuple):
+    """Lines through points (k, 2) [m]: rings and marks of spheres, planes seen from the edge, and lines of others."""
+
+    spheres: list[tuple[Array, Array]]
+    edges: list[Array]
+    grids: list[Array]
+
+
+def surfaces(points: Array, radii: Sequence[float], center: Array, half: float, step: float) -> Lines:
+    """Lines of surfaces in a picture of so much around its center.
+
+    points: (m, 2) [m], the center and mark of each sphere, then of each plane a point and those 1 m along it.
+    step: between the lines of a grid [m].
+    """
+    balls, planes = np.split(points, [2 * len(radii)])
+    ring = np.stack([np.cos(_RING), np.sin(_RING)], axis=1)
+    lines = Lines([], [], [])
+    for radius, place in zip(radii, balls.reshape(-1, 2, 2), strict=True):
+        lines.spheres.append((place[0] + (radius or half / 80.0) * ring, place))
+    for origin, *ends in planes.reshape(-1, 3, 2):
+        ways = np.array(ends) - origin
+        if abs(np.linalg.det(ways)) > EDGE_ON:
+            lines.grids.extend(grid(origin, ways, center, half, step))
+        else:
+            way = max(ways, key=np.linalg.norm)
+            way = way / (np.linalg.norm(way) or 1.0)
+            middle = origin + np.dot(center - origin, way) * way
+            lines.edges.append(np.stack([middle - 2.0 * half * way, middle + 2.0 * half * way]))
+    return lines
+
+
+def grid(origin: Array, ways: Array, center: Array, half: float, step: float) -> list[Array]:
+    """Lines of a plane, a step of its ways apart, around its place behind the middle of the picture."""
+    around = np.round(np.linalg.solve(ways.T, center - origin) / step)
+    many = math.ceil(3.0 * half / step)
+    shifts, ends = np.arange(-many, many + 1), np.array([-many, many])
+    along = [np.stack([ends, np.full(2, shift)], axis=1) for shift in shifts]
+    return [origin + step * (around + each) @ ways for each in [*along, *[line[:, ::-1] for line in along]]]

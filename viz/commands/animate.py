@@ -1,7 +1,5 @@
 """`cgraph animate`: a film of a scene's motion, or of two, one driven by the right torque and one by the flawed."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable
 
@@ -10,7 +8,7 @@ from cgraph import _shared
 
 from . import library
 from .arguments import FORMULATIONS, answer, formulation, place, positive, started, takes_a_scene, takes_a_start
-from .command import Command, say
+from .command import Command, flag, say
 
 DRIVEN = ("by_definition", "chain_rule")
 WORDS = {"by_definition": "by definition", "chain_rule": "by the chain rule"}  # others by their names
@@ -21,9 +19,7 @@ def add(parser: Command) -> None:
     takes_a_scene(parser)
     takes_a_start(parser)
     parser.add_argument("--out", type=place, required=True, help="file to write, a .gif")
-    parser.add_argument(
-        "--driven", action="store_true", help="two side by side: the same motion is wanted, driven by two torques"
-    )
+    flag(parser, "--driven", "two side by side: the same motion is wanted, driven by two torques")
     parser.add_argument(
         "--formulations",
         nargs=2,
@@ -36,7 +32,7 @@ def add(parser: Command) -> None:
     parser.add_argument(
         "--speed", type=positive, default=1.0, metavar="X", help="seconds of the motion in one of the film"
     )
-    parser.add_argument("--dark", action="store_true", help="on a dark page")
+    flag(parser, "--dark", "on a dark page")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -16,7 +16,7 @@ import dynamics as dyn
 from cgraph import _shared
 
 from . import library
-from .command import Command, say
+from .command import Command, flag, say
 
 FORMULATIONS = (
     "by_definition",
@@ -47,8 +47,8 @@ def takes_a_scene(command: Command, default: str | None = None) -> None:
 
 def reads_files(command: argparse.ArgumentParser) -> None:
     """The arguments that say how a model file is read, `READING`."""
-    command.add_argument("--ignore", action="store_true", help="leave out and name what of a file cgraph cannot model")
-    command.add_argument("--floating", action="store_true", help="let the root link of a URDF file move freely")
+    flag(command, "--ignore", "leave out and name what of a file cgraph cannot model")
+    flag(command, "--floating", "let the root link of a URDF file move freely")
     command.add_argument(
         "--limits", type=_spring, metavar="K,D", help="take limits of joints as springs of this stiffness and damping"
     )
@@ -58,7 +58,7 @@ def reads_files(command: argparse.ArgumentParser) -> None:
         metavar="V",
         help="take friction loss, most of which acts from this velocity on; 0: it sticks",
     )
-    command.add_argument("--actuators", action="store_true", help="take motors and servos of MJCF, with inputs at 0")
+    flag(command, "--actuators", "take motors and servos of MJCF, with inputs at 0")
     command.add_argument(
         "--contacts",
         type=material,
@@ -91,7 +91,7 @@ def writes_a_page(command: argparse.ArgumentParser) -> None:
 
 def may_open(command: argparse.ArgumentParser) -> None:
     """The argument `--open`, which shows a page."""
-    command.add_argument("--open", action="store_true", help="open the page in the browser once it is written")
+    flag(command, "--open", "open the page in the browser once it is written")
 
 
 def answer_page(options: argparse.Namespace, text: str, page: str) -> None:
@@ -134,8 +134,8 @@ def takes_equations(command: Command) -> None:
         choices=FORMULATIONS,
         help="of inverse dynamics (chain_rule)",
     )
-    which.add_argument("--forward", action="store_true", help="forward dynamics, with outputs such as qdd0")
-    which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, with outputs such as p0_dot")
+    flag(which, "--forward", "forward dynamics, with outputs such as qdd0")
+    flag(which, "--momentum", f"{MOMENTUM_FORM}, with outputs such as p0_dot")
 
 
 def verdict_of(options: argparse.Namespace, scene: dyn.scenes.Scene) -> dyn.Verdict | None:
@@ -178,18 +178,16 @@ def formulation(text: str) -> str:
     return FORMER_NAMES.get(text, text)
 
 
-def whole(text: str) -> int:
-    """A whole number, at least 0, for argparse."""
-    if not (text.isascii() and text.isdecimal()):
-        raise argparse.ArgumentTypeError(f"expected a whole number, at least 0, got {text!r}")
+def whole(text: str, least: int = 0) -> int:
+    """A whole number, at least so large, for argparse."""
+    if not (text.isascii() and text.isdecimal() and int(text) >= least):
+        raise argparse.ArgumentTypeError(f"expected a whole number, at least {least}, got {text!r}")
     return int(text)
 
 
 def counting(text: str) -> int:
     """A whole number, at least 1, for argparse."""
-    if not (text.isascii() and text.isdecimal() and int(text)):
-        raise argparse.ArgumentTypeError(f"expected a whole number, at least 1, got {text!r}")
-    return int(text)
+    return whole(text, 1)
 
 
 def number(text: str) -> float:
@@ -218,7 +216,7 @@ def from_zero(text: str) -> float:
 
 def may_draw_and_print(command: argparse.ArgumentParser) -> None:
     """The arguments `--json` and `--svg`; `draw` writes the picture."""
-    command.add_argument("--json", action="store_true", help="print as JSON")
+    flag(command, "--json", "print as JSON")
     command.add_argument("--svg", type=_svg_file, metavar="FILE", help="draw the graph, with the answer marked")
 
 

@@ -9,7 +9,7 @@ import dynamics as dyn
 
 from . import library
 from .arguments import answer, counting, scene_of, takes_a_scene, unless_json, whole
-from .command import Command, say
+from .command import Command, flag, say
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -20,7 +20,7 @@ def add(parser: Command) -> None:
     takes_a_scene(parser)
     parser.add_argument("--states", type=counting, default=20, metavar="N", help="random states (default: 20)")
     parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random states (default: 0)")
-    parser.add_argument("--json", action="store_true", help="print as JSON")
+    flag(parser, "--json", "print as JSON")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -14,7 +14,7 @@ from cgraph import _shared
 
 from . import library
 from .arguments import answer, box, place, scene_of, takes_a_scene
-from .command import Command
+from .command import Command, flag
 
 EQUATIONS = ("forward_dynamics", "inverse_dynamics", "state_equation", "mass_matrix", "energy")  # of `dynamics`
 SUFFIXES = {"c": ".c", "js": ".mjs", "python": ".py"}
@@ -35,11 +35,7 @@ def add(parser: Command) -> None:
     parser.add_argument(
         "--out", type=place, help="file to write, in place of standard output: .c (and .h), .mjs or .py"
     )
-    parser.add_argument(
-        "--float32",
-        action="store_true",
-        help="C in float alone; the header says a bound of the rounding of each output",
-    )
+    flag(parser, "--float32", "C in float alone; the header says a bound of the rounding of each output")
     parser.add_argument(
         "--box",
         type=box,

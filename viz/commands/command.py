@@ -62,9 +62,14 @@ class Command(argparse.ArgumentParser):
         return super().format_help()
 
 
+def flag(command: argparse._ActionsContainer, name: str, about: str) -> None:
+    """Add an option that is given or not.  about: its help."""
+    command.add_argument(name, action="store_true", help=about)
+
+
 # What each does, in the order of the help. To add a command, write its file and name it here.
 COMMANDS = {
-    "paper": "the paper's six figures and its table, measured, and three of our own, in one folder",
+    "paper": "the paper's six figures and its table, measured, and four of our own, in one folder",
     "report": "error beside run time of every integrator, as pages",
     "scenes": "the scenes, with the size of their graphs",
     "equations": "the Lagrangian, momenta and torques of a scene as formulas; status 1 for a wrong formulation",
@@ -80,7 +85,6 @@ COMMANDS = {
     "why": "what makes a torque, by cause and body; why it depends on an input; where a NaN comes from",
     "compare": "compare two formulations of a scene's equations, node by node; status 1 where they differ",
     "lesson": "a page for a class, on any scene: predict, reveal, try; a worksheet, and the key to it",
-    "completion": "a script that lets the Tab key complete commands and options",
 }
 
 ALIKE = 0.7  # share of the letters that two words have in common

@@ -10,48 +10,33 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph import _shared
 
-from . import library
-from .arguments import (
-    FORMULATIONS,
-    MOMENTUM_FORM,
-    answer,
-    answer_and_draw,
-    check_picture,
-    formulation,
-    may_draw_and_print,
-    scene_of,
-    state_names,
-    takes_a_scene,
-    unless_json,
-)
-from .command import Command
+from . import arguments, library
+from .command import Command, flag
 from .points import filled
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    takes_a_scene(parser)
+    arguments.takes_a_scene(parser)
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
         "--formulations",
         nargs=2,
         default=("by_definition", "chain_rule"),
-        type=formulation,
-        choices=FORMULATIONS,
+        type=arguments.formulation,
+        choices=arguments.FORMULATIONS,
         metavar=("LEFT", "RIGHT"),
-        help=f"two of {', '.join(FORMULATIONS)} (default: by_definition chain_rule)",
+        help=f"two of {', '.join(arguments.FORMULATIONS)} (default: by_definition chain_rule)",
     )
-    which.add_argument("--momentum", action="store_true", help=f"the state equation and {MOMENTUM_FORM}")
-    which.add_argument(
-        "--sizes", action="store_true", help="sizes of p and dp/dt and of tau by the paper's three formulations alone"
-    )
-    may_draw_and_print(parser)
+    flag(which, "--momentum", f"the state equation and {arguments.MOMENTUM_FORM}")
+    flag(which, "--sizes", "sizes of p and dp/dt and of tau by the paper's three formulations alone")
+    arguments.may_draw_and_print(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the totals of both sides and the classes of what only one of them has; 1 where one has anything."""
-    check_picture(options)
-    scene = scene_of(options)
+    arguments.check_picture(options)
+    scene = arguments.scene_of(options)
     if options.sizes:
         _sizes(options, scene)
         return 0
@@ -60,7 +45,8 @@ def run(options: argparse.Namespace) -> int:
     graphs = library.both_forms(scene) if options.momentum else {name: each.graph for name, each in verdicts.items()}
     named = dict(zip(("left", "right"), graphs if options.momentum else options.formulations, strict=True))
     left, right = (graphs[name] for name in named.values())
-    state = [] if options.momentum else [n for each in (left, right) for part in state_names(each, scene) for n in part]
+    of_velocities = [] if options.momentum else [left, right]
+    state = [name for each in of_velocities for part in arguments.state_names(each, scene) for name in part]
     called = dyn.display_names(scene)
     classes = library.form_classes if options.momentum else library.formulation_classes(verdicts.values())
     comparison = cg.compare(left, right, atoms=dict.fromkeys(state), classify=classes, names=called)
@@ -79,9 +65,9 @@ def run(options: argparse.Namespace) -> int:
         data, lines = data | agreement, [text, *lines]
     together = comparison.overlay()
     groups = [f"only {name}" for name in named.values()], (together.only_left, together.only_right)
-    answer_and_draw(
+    arguments.answer_and_draw(
         options,
-        unless_json(options, data, "\n".join([*lines, str(comparison), *told])),
+        arguments.unless_json(options, data, "\n".join([*lines, str(comparison), *told])),
         together.graph,
         scene,
         marked=dict(zip(*groups, strict=True)),
@@ -99,7 +85,7 @@ def _sizes(options: argparse.Namespace, scene: dyn.scenes.Scene) -> None:
     fields = next(iter(sizes.values()))._fields
     text = "\n".join(library.table(("", "", *[name.replace("_", " ") for name in fields]), rows, (0, 1)))
     data = [{"term": term, "formulation": name} | size._asdict() for (term, name), size in sizes.items()]
-    answer(unless_json(options, data, text))
+    arguments.answer(arguments.unless_json(options, data, text))
 
 
 def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, _shared.Json], str]:

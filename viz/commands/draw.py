@@ -11,7 +11,7 @@ from cgraph import _shared
 
 from . import library
 from .arguments import answer, collapsed, equations_of, place, scene_of, takes_equations
-from .command import Command
+from .command import Command, flag
 
 PICTURES = (".svg", ".png")
 KINDS = (*PICTURES, ".dot", ".txt")
@@ -20,11 +20,7 @@ KINDS = (*PICTURES, ".dot", ".txt")
 def add(parser: Command) -> None:
     """The command's arguments."""
     takes_equations(parser)
-    parser.add_argument(
-        "--inertial-term",
-        action="store_true",
-        help="p and dp/dt alone, as in the paper's figures, by the --formulation",
-    )
+    flag(parser, "--inertial-term", "p and dp/dt alone, as in the paper's figures, by the --formulation")
     parser.add_argument("--out", type=place, required=True, help="file to write: .svg, .png, .dot or .txt")
     parser.add_argument(
         "--collapse",

@@ -4,7 +4,7 @@ import argparse
 
 from . import library
 from .arguments import FORMULATIONS, MOMENTUM_FORM, answer, counting, formulation, scene_of, takes_a_scene, verdict_of
-from .command import Command
+from .command import Command, flag
 
 DIGITS = 6
 
@@ -16,17 +16,15 @@ def add(parser: Command) -> None:
     which.add_argument(
         "--formulation", type=formulation, choices=FORMULATIONS, help="of the torque (default: chain_rule)"
     )
-    which.add_argument(
-        "--forward", action="store_true", help="accelerations, and multipliers of constraints, in place of the torque"
-    )
-    which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of the torque")
+    flag(which, "--forward", "accelerations, and multipliers of constraints, in place of the torque")
+    flag(which, "--momentum", f"{MOMENTUM_FORM}, in place of the torque")
     parser.add_argument(
         "--lines", type=counting, default=200, metavar="N", help="of each block, at most (default: 200)"
     )
     parser.add_argument(
         "--digits", type=counting, default=DIGITS, metavar="N", help=f"of numbers (default: {DIGITS}; 17 are all)"
     )
-    parser.add_argument("--latex", action="store_true", help="print as LaTeX")
+    flag(parser, "--latex", "print as LaTeX")
 
 
 def run(options: argparse.Namespace) -> int:

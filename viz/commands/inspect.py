@@ -4,32 +4,24 @@ import argparse
 
 from cgraph import _shared
 
-from . import library
-from .arguments import (
-    MOMENTUM_FORM,
-    answer_page,
-    positive,
-    started,
-    takes_a_scene,
-    takes_a_start,
-    unless_json,
-    writes_a_page,
-)
-from .command import Command, say
+from . import arguments, library
+from .command import Command, flag, say
 
 LONGEST_MOTION = 1000.0  # s: seconds of work for an arm of ten links
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    takes_a_scene(parser)
-    writes_a_page(parser)
+    arguments.takes_a_scene(parser)
+    arguments.writes_a_page(parser)
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--forward", action="store_true", help="show forward dynamics first")
-    which.add_argument("--momentum", action="store_true", help=f"show {MOMENTUM_FORM} first")
-    takes_a_start(parser)
-    parser.add_argument("--t-end", type=positive, metavar="S", help="how long it moves, in place of the scene's time")
-    parser.add_argument("--json", action="store_true", help="print the sizes as JSON")
+    flag(which, "--forward", "show forward dynamics first")
+    flag(which, "--momentum", f"show {arguments.MOMENTUM_FORM} first")
+    arguments.takes_a_start(parser)
+    parser.add_argument(
+        "--t-end", type=arguments.positive, metavar="S", help="how long it moves, in place of the scene's time"
+    )
+    flag(parser, "--json", "print the sizes as JSON")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -40,7 +32,7 @@ def run(options: argparse.Namespace) -> int:
         )
     library.html_target("--out", options.out)
     say(f"reading {options.scene}")
-    scene, moved = started(options)
+    scene, moved = arguments.started(options)
     content = library.inspection(scene, t_end=options.t_end, say=say)
     count = sum(len(each.graph.nodes) for each in content.versions.values())
     say(f"{scene.name}: writing the page of {_shared.counted(count, 'node')}")
@@ -58,5 +50,7 @@ def run(options: argparse.Namespace) -> int:
     size = len(text.encode())
     counts = ", ".join(f"{name} {_shared.counted(version['nodes'], 'node')}" for name, version in sizes.items())
     data = {"scene": scene.name, "bytes": size, "stopped": content.stopped, "versions": sizes}
-    answer_page(options, unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), text)
+    arguments.answer_page(
+        options, arguments.unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), text
+    )
     return 1 if content.stopped else 0

@@ -31,16 +31,12 @@ def add(parser: Command) -> None:
 
 def run(parser: Command, options: argparse.Namespace) -> None:
     """Write the pages that are asked for."""
-    asked = {
-        "page": ("--out", options.out),
-        "worksheet": ("--worksheet", options.worksheet),
-        "key": ("--key", options.key),
-    }
-    targets = {form: path for form, (_, path) in asked.items() if path}
+    asked = {"page": options.out, "worksheet": options.worksheet, "key": options.key}
+    targets = {form: path for form, path in asked.items() if path}
     if not targets:
         parser.error("one of --out, --worksheet and --key is required")
-    for option, path in asked.values():
-        library.html_target(option, path)
+    for form, path in targets.items():
+        library.html_target("--out" if form == "page" else f"--{form}", path)
     if len({path.resolve() for path in targets.values()}) < len(targets):
         raise ValueError("--out, --worksheet and --key need different files")
     scene = scene_of(options)

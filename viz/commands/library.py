@@ -9,7 +9,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from cgraph.extend import Names, cotangents
     from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
-    from dynamics.equations.formulations.step_state import after_step, before_step
+    from dynamics.equations.formulations.lagrange_terms import after_step, before_step
     from dynamics.experiments.stability import stability
     from dynamics.experiments.text_table import table
     from dynamics.experiments.work_precision import named_tasks, work_precision

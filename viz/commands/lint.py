@@ -8,19 +8,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph import _shared
 
-from . import library
-from .arguments import (
-    answer_and_draw,
-    box,
-    check_picture,
-    equations_of,
-    may_draw_and_print,
-    point,
-    scene_of,
-    state_names,
-    takes_equations,
-    unless_json,
-)
+from . import arguments, library
 from .command import Command
 from .compare import size_table
 from .points import REST, filled
@@ -28,31 +16,31 @@ from .points import REST, filled
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    takes_equations(parser)
+    arguments.takes_equations(parser)
     parser.add_argument(
         "--box",
-        type=box,
+        type=arguments.box,
         metavar="A=LOW:HIGH,...",
         help="look for slopes that could be unbounded in this box of inputs",
     )
     parser.add_argument(
-        "--at", type=point, metavar="A=1,B=2", help=f"look for sums that lose digits at this point; {REST}"
+        "--at", type=arguments.point, metavar="A=1,B=2", help=f"look for sums that lose digits at this point; {REST}"
     )
-    may_draw_and_print(parser)
+    arguments.may_draw_and_print(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the proof or the blame; 1 where anything is not as declared."""
-    check_picture(options)
-    scene = scene_of(options)
-    graph, what, verdict = equations_of(options, scene)
+    arguments.check_picture(options)
+    scene = arguments.scene_of(options)
+    graph, what, verdict = arguments.equations_of(options, scene)
     at = None if options.at is None else filled(graph, scene, options.at)
     if verdict is not None and verdict.differs and options.at:
         given = at or {}
         others = {name: x for name, x in given.items() if name != "dt" and not name.endswith("_old")}
         after = library.after_step(scene.system, given) | others  # the state after the embedded step
         verdict = dyn.formulation_verdict(scene, options.formulation, after)
-    q, qd = state_names(graph, scene, momentum=options.momentum)
+    q, qd = arguments.state_names(graph, scene, momentum=options.momentum)
     report = cg.lint(
         graph,
         independent=[(q, qd)] if q and qd else [],
@@ -74,9 +62,9 @@ def run(options: argparse.Namespace) -> int:
     data |= {"conserved": list(conserved.quantities) if conserved else [], "ok": ok}
     data |= {"verdict": verdict.to_dict()} if verdict else {}
     data |= {"sizes": sizes} if sizes else {}
-    answer_and_draw(
+    arguments.answer_and_draw(
         options,
-        unless_json(options, data, "\n".join(filter(None, told))),
+        arguments.unless_json(options, data, "\n".join(filter(None, told))),
         graph,
         scene,
         marked=(verdict.nodes if verdict else frozenset())

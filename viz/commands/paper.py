@@ -1,22 +1,21 @@
 """`cgraph paper`: the paper's figures and its table, measured, in one folder."""
 
 import argparse
-import json
 from pathlib import Path
 
 import dynamics as dyn
 
 from . import library
-from .arguments import answer, may_open, place
-from .command import Command, say
+from .arguments import answer, may_open, place, unless_json
+from .command import Command, flag, say
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
     parser.add_argument("--out", type=place, default=Path("paper"), help="folder to fill (default: paper)")
-    parser.add_argument("--quick", action="store_true", help="times of fewer evaluations, and shorter chains")
+    flag(parser, "--quick", "times of fewer evaluations, and shorter chains")
     may_open(parser)
-    parser.add_argument("--json", action="store_true", help="print the figures as JSON on standard output")
+    flag(parser, "--json", "print the figures as JSON on standard output")
 
 
 def run(options: argparse.Namespace) -> None:
@@ -31,5 +30,5 @@ def run(options: argparse.Namespace) -> None:
     }
     files, data = library.paper(options.out, say, quick=options.quick, beside=beside)
     page = options.out / "index.html"
-    said = json.dumps(data, indent=1) if options.json else f"All of it on one page: {page}"
+    said = unless_json(options, data, f"All of it on one page: {page}")
     answer(said, files, folder=options.out, show=page if options.open else None)

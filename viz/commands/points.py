@@ -1,8 +1,6 @@
-"""Points of a graph's inputs for commands: what is given filled up with the rest, and as text."""
+"""Points of a graph's inputs for commands: what is given, filled up with the rest."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
 
 import cgraph as cg
 import dynamics as dyn
@@ -12,7 +10,6 @@ from . import library
 SEED, DIGITS = 20250814, 3  # of the numbers that nobody gave: always the same, and short enough to be typed again
 
 DT = 1e-3  # s, the step of an embedded relation
-SHOWN = 12  # inputs that a line of text names
 
 REST = (
     f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, q and qd of a file "
@@ -53,10 +50,3 @@ def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) ->
         raise ValueError(f"--at gives {called[twice[0]]} after the step, and {called[now[twice[0]]]} before it")
     values |= before
     return library.before_step(scene.system, values, after) if after else values
-
-
-def point_text(at: Mapping[str, float], most: int = SHOWN) -> str:
-    """`q.knee=0.1, qd.knee=2`, and of many inputs the first."""
-    shown = [f"{name}={value:g}" for name, value in list(at.items())[:most]]
-    rest = [f"and {len(at) - most} more"] if len(at) > most else []
-    return ", ".join([*shown, *rest])

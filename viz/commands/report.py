@@ -6,6 +6,7 @@ import argparse
 import shutil
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,7 +16,7 @@ from cgraph import _shared
 
 from . import library
 from .arguments import IN_PYTHON, READING, answer, number, place, positive, reading, reads_files, start, unless_json
-from .command import Command, say
+from .command import Command, flag, say
 
 CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
 
@@ -35,16 +36,14 @@ FOLDER = Path("report")
 def add(parser: Command) -> None:
     """The command's arguments."""
     parser.names |= {
-        "scenes": lambda: [*dyn.scenes.names(), *library.named_tasks.names()],
+        "scenes": lambda: [*dyn.scenes.names(), *library.named_tasks.TASKS],
         "methods": lambda: dyn.METHODS,
         "effects": lambda: dyn.EFFECTS,
     }
     parser.add_argument(
         "scenes", nargs="*", metavar="SCENE", help=f"{{scenes}}, a model file, MJCF or URDF, a case, or {IN_PYTHON}"
     )
-    parser.add_argument(
-        "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
-    )
+    flag(parser, "--stability", "the table of stiff and extreme cases; status 1 for an unexplained row")
     reads_files(parser)
     parser.add_argument("--out", type=place, help=f"folder to fill (default: {FOLDER}; with --json, none)")
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, instead of the scene's own time")
@@ -52,9 +51,9 @@ def add(parser: Command) -> None:
         "--start", type=start, metavar="A=1,B=2", help="instead of the scene's own: by names, or all numbers"
     )
     parser.add_argument("--methods", type=listed, metavar="A,B", help="only these of {methods}")
-    parser.add_argument("--quick", action="store_true", help="fewer turns and shorter runs")
-    parser.add_argument("--json", action="store_true", help="print as JSON")
-    parser.add_argument("--pruning", action="store_true", help="instead: what the scene's graphs hold and leave out")
+    flag(parser, "--quick", "fewer turns and shorter runs")
+    flag(parser, "--json", "print as JSON")
+    flag(parser, "--pruning", "instead: what the scene's graphs hold and leave out")
     parser.add_argument("--without", type=listed, metavar="A,B", help="with --pruning: leave out {effects}")
     parser.add_argument(
         "--lock", type=_locked, action="append", metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
@@ -80,10 +79,7 @@ def run(options: argparse.Namespace) -> int | None:
             raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(with_these)}, not with {kind}")
     if options.out is not None:
         library.check_folder(options.out)
-    if kind == STABILITY:
-        return _stability(options)
-    (_curves if kind == CURVES else _pruning)(options)
-    return None
+    return {CURVES: _curves, STABILITY: _stability, PRUNING: _pruning}[kind](options)
 
 
 def listed(text: str) -> tuple[str, ...]:
@@ -147,7 +143,7 @@ def _stability(options: argparse.Namespace) -> int:
         files |= library.document_files(options.out, "stability", document, content, rows)
         text = f"{text}\n{[*files][-1]}"
     answer(unless_json(options, content, text), files, folder=options.out)
-    unexplained = [f"{each.case} by {each.method}" for each in found if not each.explained]
+    unexplained = [f"{each.case} by {each.method}" for each in found if each.verdict == "unexplained"]
     if unexplained:
         say(f"beyond its bound without a known reason: {', '.join(unexplained)}")
     return 1 if unexplained else 0
@@ -198,10 +194,7 @@ def _account(pruned: library.PruneResult) -> dict[str, Any]:
         for name, counts in (("full", full), ("pruned", left))
     }
     rows = {"left_out": pruned.omitted, "absent": pruned.absent, "remains": pruned.remains}
-    told = {
-        name: [{what: getattr(each, what) for what in ("what", "why", "nodes", "edges")} for each in terms]
-        for name, terms in rows.items()
-    }
+    told = {name: [asdict(each) for each in terms] for name, terms in rows.items()}
     tags = sorted({*full.by_tag, *left.by_tag})
     return sizes | told | {"by_tag": {tag: [full.by_tag.get(tag, 0), left.by_tag.get(tag, 0)] for tag in tags}}
 

@@ -7,12 +7,12 @@ import dynamics as dyn
 from cgraph import _shared
 
 from .arguments import answer, unless_json
-from .command import Command
+from .command import Command, flag
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    parser.add_argument("--json", action="store_true", help="print as JSON")
+    flag(parser, "--json", "print as JSON")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -12,7 +12,7 @@ from cgraph import _shared
 
 from . import library
 from .arguments import MOMENTUM_FORM, answer, place, positive, started, takes_a_scene, takes_a_start, unless_json
-from .command import Command
+from .command import Command, flag
 
 METHOD = "dop853"
 SHOWN = 12  # states that the summary names
@@ -28,12 +28,12 @@ def add(parser: Command) -> None:
     parser.names["methods"] = lambda: dyn.METHODS
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, in place of the scene's time")
     parser.add_argument("--method", default=METHOD, metavar="NAME", help=f"{{methods}} (default: {METHOD})")
-    parser.add_argument("--momentum", action="store_true", help=f"step {MOMENTUM_FORM}")
+    flag(parser, "--momentum", f"step {MOMENTUM_FORM}")
     parser.add_argument("--dt", type=positive, metavar="S", help="the largest of equal steps (default: 0.001)")
     parser.add_argument("--rtol", type=positive, metavar="R", help="relative error of a chosen step (default: 1e-9)")
     parser.add_argument("--every", type=positive, metavar="S", help="a row so often (default: every step is one)")
     parser.add_argument("--csv", type=place, metavar="FILE", help="write t, q, qd and energy, a line for each row")
-    parser.add_argument("--json", action="store_true", help="print as JSON")
+    flag(parser, "--json", "print as JSON")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -7,29 +7,18 @@ import argparse
 import cgraph as cg
 import dynamics as dyn
 
-from . import library
-from .arguments import (
-    answer,
-    answer_and_draw,
-    check_picture,
-    counting,
-    equations_of,
-    may_draw_and_print,
-    point,
-    scene_of,
-    takes_equations,
-    unless_json,
-)
-from .command import Command
-from .points import REST, SHOWN, filled, point_text
+from . import arguments, library
+from .command import Command, flag
+from .points import REST, filled
 
 KINDS = {"jump": "jumps, ", "kink": "kinks, the slope of ", "smooth": "no change near this state"}
+SHOWN = 12  # inputs that a line of text names
 PATHS = 5  # that are listed and drawn where nothing else is said
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    takes_equations(parser)
+    arguments.takes_equations(parser)
     parser.add_argument(
         "output",
         metavar="WHAT",
@@ -38,17 +27,17 @@ def add(parser: Command) -> None:
     )
     parser.add_argument("input", metavar="INPUT", nargs="?", help="why it depends on this, such as q2, or q.hip")
     parser.late = "output", "input"
+    flag(parser, "--nan", "where a value that is not finite, or a derivative by INPUT, comes from")
+    flag(parser, "--switches", "on which surfaces the rate jumps or kinks, and by how much near --at")
     parser.add_argument(
-        "--nan", action="store_true", help="where a value that is not finite, or a derivative by INPUT, comes from"
+        "--k",
+        type=arguments.counting,
+        default=PATHS,
+        metavar="K",
+        help=f"paths to list, heaviest first (default: {PATHS})",
     )
-    parser.add_argument(
-        "--switches", action="store_true", help="on which surfaces the rate jumps or kinks, and by how much near --at"
-    )
-    parser.add_argument(
-        "--k", type=counting, default=PATHS, metavar="K", help=f"paths to list, heaviest first (default: {PATHS})"
-    )
-    parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"at which state; {REST}")
-    may_draw_and_print(parser)
+    parser.add_argument("--at", type=arguments.point, default={}, metavar="A=1,B=2", help=f"at which state; {REST}")
+    arguments.may_draw_and_print(parser)
 
 
 def run(options: argparse.Namespace) -> int | None:
@@ -60,9 +49,9 @@ def run(options: argparse.Namespace) -> int | None:
         raise ValueError("why needs to know WHAT: a torque, such as tau0, or a cause, such as gravity")
     if options.svg and not (options.input or options.nan):
         raise ValueError("--svg draws the paths from INPUT: name one, as in `why SCENE tau0 q1`")
-    check_picture(options)
-    scene = scene_of(options)
-    graph, _, verdict = equations_of(options, scene)
+    arguments.check_picture(options)
+    scene = arguments.scene_of(options)
+    graph, _, verdict = arguments.equations_of(options, scene)
     names = library.Names(graph, dyn.display_names(scene))
     at = filled(graph, scene, options.at)
     if options.nan:
@@ -83,13 +72,16 @@ def run(options: argparse.Namespace) -> int | None:
         asked = in_all = table.in_all(options.output, options.input or "")
         if options.svg:
             raise ValueError(f"--svg draws paths between two nodes, and {in_all.name!r} is a cause")
-    answer(unless_json(options, {"at": at} | asked.to_dict(), f"{state}\n{asked}\n{alone}".rstrip()))
+    arguments.answer(
+        arguments.unless_json(options, {"at": at} | asked.to_dict(), f"{state}\n{asked}\n{alone}".rstrip())
+    )
     return None
 
 
 def _state(options: argparse.Namespace, names: library.Names, at: dict[str, float]) -> str:
     """The state in words: all of one that was asked for, else the first of its numbers."""
-    return point_text({names.shown(name): x for name, x in at.items()}, len(at) if options.at else SHOWN)
+    shown, most = [f"{names.shown(name)}={x:g}" for name, x in at.items()], len(at) if options.at else SHOWN
+    return ", ".join([*shown[:most], *([f"and {len(at) - most} more"] if len(at) > most else [])])
 
 
 def _dependence(
@@ -122,9 +114,9 @@ def _dependence(
     data = {"depends": True, "of_the_tree": bool(alone), "at": at} | found.to_dict() | balance
     data |= {"causes": causes.to_dict()} if causes else {}
     wrong = verdict is not None and verdict.differs
-    answer_and_draw(
+    arguments.answer_and_draw(
         options,
-        unless_json(options, data, "\n".join(text)),
+        arguments.unless_json(options, data, "\n".join(text)),
         graph,
         scene,
         only=found.nodes,
@@ -140,7 +132,9 @@ def _nan(options: argparse.Namespace, scene: dyn.scenes.Scene, names: library.Na
     output = options.output and names.meant(options.output)
     found = cg.why_nan(names.graph, at, output or None, options.input, names=dyn.display_names(scene))
     marked = {found.node} & set(names.graph.nodes)
-    answer_and_draw(options, unless_json(options, found.to_dict(), found), names.graph, scene, marked=marked)
+    arguments.answer_and_draw(
+        options, arguments.unless_json(options, found.to_dict(), found), names.graph, scene, marked=marked
+    )
     return 1 if found.what else 0
 
 
@@ -148,7 +142,7 @@ def _switches(options: argparse.Namespace) -> None:
     """Print the surfaces on which the rate jumps or kinks, drawn in it as the nodes that switch."""
     if options.output:
         raise ValueError(f"--switches is about the whole rate, and not about {options.output!r}")
-    scene = scene_of(options)
+    scene = arguments.scene_of(options)
     rate = dyn.hamilton_equations(scene) if options.momentum else dyn.state_equation(scene)
     names, at = library.Names(rate, dyn.display_names(scene)), filled(rate, scene, options.at)
     found = library.surfaces(scene, at, "momentum" if options.momentum else "velocity")
@@ -160,7 +154,7 @@ def _switches(options: argparse.Namespace) -> None:
     text = "\n".join(lines) if found else "The rate is smooth: nothing in it switches."
     data = {"at": at, "surfaces": [each._asdict() for each in found]}
     marked = {"switches": {node for node in rate.nodes if node.op.name in library.SWITCHED}}
-    answer_and_draw(options, unless_json(options, data, text), rate, scene, marked=marked)
+    arguments.answer_and_draw(options, arguments.unless_json(options, data, text), rate, scene, marked=marked)
 
 
 def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: library.Names, output: str) -> None:
@@ -177,9 +171,9 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
     data = {"depends": False, "of_the_tree": bool(alone)} | stops.to_dict()
     data |= {"constant": "\n".join(told)} if told else {}
     here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
-    answer_and_draw(
+    arguments.answer_and_draw(
         options,
-        unless_json(options, data, "\n".join(filter(None, [str(stops), alone, *told]))),
+        arguments.unless_json(options, data, "\n".join(filter(None, [str(stops), alone, *told]))),
         graph,
         scene,
         marked={

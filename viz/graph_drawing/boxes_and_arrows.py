@@ -9,7 +9,6 @@ from cgraph._shared import columns, counted
 from cgraph.extend import Names
 
 from .. import theme
-from ..theme import Paint
 from .draw_shapes import BOX, LEAF_SIZE, Arrow, Attributes, Box
 
 ClusterRule = Callable[[Node], str | None]
@@ -30,7 +29,7 @@ class Plan:
     graph: Graph
     names: Mapping[str, str]
     formulas: Mapping[Node, str]
-    marks: Mapping[Node, Paint]
+    marks: Mapping[Node, theme.Paint]
     marked_edges: frozenset[Edge]
     wrong_outputs: frozenset[str]
     cluster_of: ClusterRule
@@ -109,7 +108,7 @@ class Plan:
     def _shown(self, name: str) -> str:
         return self.names[name] if name in self.names else theme.pretty(name)
 
-    def _mark_of(self, edge: Edge) -> Paint | None:
+    def _mark_of(self, edge: Edge) -> theme.Paint | None:
         return self.marks.get(edge.source) or (theme.MARKS[0] if edge in self.marked_edges else None)
 
     def _tail(self, edge: Edge) -> str:
@@ -170,5 +169,5 @@ def _look(look: Attributes, heavy: bool) -> Attributes:
     return {**look, "penwidth": "3"} if heavy else look
 
 
-def _line(mark: Paint | None) -> Attributes:
+def _line(mark: theme.Paint | None) -> Attributes:
     return {"color": mark.line, "penwidth": "2.5"} if mark else {}

@@ -10,7 +10,6 @@ from cgraph import Edge, Graph, Node, _shared
 from cgraph.extend import Names
 
 from .. import theme
-from ..theme import Paint
 from .boxes_and_arrows import ClusterRule, Plan
 from .draw_shapes import digraph, draw_boxes, draw_legend, escaped, literal
 
@@ -130,12 +129,12 @@ def to_dot(
     return drawing
 
 
-def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, Paint]:
+def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, theme.Paint]:
     """Paint of each marked node."""
     groups = marked if isinstance(marked, Mapping) else {words: marked}
     if len(groups) > len(theme.MARKS):
         raise ValueError(f"marked nodes come in at most {len(theme.MARKS)} groups, got {len(groups)}")
-    marks: dict[Node, Paint] = {}
+    marks: dict[Node, theme.Paint] = {}
     for paint, (group, given) in zip(theme.MARKS, groups.items(), strict=False):
         nodes = _shared.require_sequence("marked", given, "nodes", Node)
         if both := [node for node in nodes if node in marks]:

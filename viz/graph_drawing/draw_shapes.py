@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cgraph._shared import install
+from cgraph._shared import required
 
 from .. import theme
-from ..theme import Paint
 
 if TYPE_CHECKING:
     from graphviz import Digraph
@@ -26,20 +25,17 @@ class Box:
     """One shape of the drawing."""
 
     id: str
-    kind: Paint
+    kind: theme.Paint
     attributes: Attributes
     cluster: str | None = None
 
 
 def digraph(rankdir: str) -> Digraph:
     """An empty drawing in the fonts and colors of the theme."""
-    try:
-        from graphviz import Digraph
-    except ImportError as error:
-        raise ImportError(f"drawing a graph needs the Python package graphviz: {install('viz')}") from error
+    graphviz = required("graphviz", "drawing a graph needs the Python package graphviz", "viz")
     small = str(theme.SMALL_FONT_SIZE)
     font = {"fontname": theme.FONT, "fontcolor": theme.TEXT}
-    return Digraph(
+    drawing: Digraph = graphviz.Digraph(
         "graph",
         graph_attr={
             **font,
@@ -53,6 +49,7 @@ def digraph(rankdir: str) -> Digraph:
         node_attr={**font, "fontsize": str(theme.FONT_SIZE), "width": "0.3"},
         edge_attr={**font, "fontsize": small, "color": theme.LINE, "arrowsize": "0.6", "labeldistance": "1.4"},
     )
+    return drawing
 
 
 def draw_boxes(drawing: Digraph, boxes: Sequence[Box]) -> None:
@@ -63,10 +60,9 @@ def draw_boxes(drawing: Digraph, boxes: Sequence[Box]) -> None:
             _draw_box(drawing, box)
         else:
             clusters.setdefault(box.cluster, []).append(box)
-    colors = theme.tag_colors(clusters)
     for i, title in enumerate(sorted(clusters, key=theme.natural_order)):
         with drawing.subgraph(name=f"cluster_{i}") as frame:
-            color = colors[title]
+            color = theme.SERIES[i % len(theme.SERIES)]
             frame.attr(**escaped({"id": f"t{i}", "label": title, "tooltip": title}), style="filled,rounded")
             frame.attr(color=color, fillcolor=theme.tint(color, 0.08), labeljust="l", margin="10", fontsize="12")
             for box in clusters[title]:

@@ -9,14 +9,17 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 from xml.etree import ElementTree
 
 from cgraph import Graph, constant
-from cgraph._shared import install, memo, real_number, require_choice
+from cgraph._shared import install, memo, real_number, require_choice, required
 
 from .. import theme
 from .dot import to_dot
+
+if TYPE_CHECKING:
+    from graphviz import Digraph
 
 ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork")
 LONGEST_WAIT = 1e6  # s, that a drawing may be waited for
@@ -49,15 +52,7 @@ class RenderError(RuntimeError):
     """A picture that could not be made, and why."""
 
 
-class Drawing(Protocol):
-    """Result of `to_dot`: something that holds its DOT text."""
-
-    @property
-    def source(self) -> str:
-        """The DOT text."""
-
-
-def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float = 60.0) -> str:
+def render_svg(dot_source: str | Digraph, *, engine: str = "dot", timeout: float = 60.0) -> str:
     """The drawing of a DOT source, or of what `to_dot` returns, as one `<svg>` element.
 
     Parameters
@@ -174,10 +169,7 @@ def render_png(svg: str, *, scale: float = 2.0) -> bytes:
 
 
 def _resvg() -> Callable[..., bytes]:
-    try:
-        from resvg_py import svg_to_bytes
-    except ImportError as error:
-        raise ImportError(f"PNG pictures need resvg: {install('viz')}") from error
+    svg_to_bytes: Callable[..., bytes] = required("resvg_py", "PNG pictures need resvg", "viz").svg_to_bytes
     return svg_to_bytes
 
 

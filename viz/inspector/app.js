@@ -231,10 +231,7 @@ function makeTabs(app) {
 function choose(app, i) {
   const { versions } = app.state, tabs = [...byId("versions").children];
   if (!tabs[i] || (i === app.index && !app.other)) return;
-  tabs.forEach((button, k) => {
-    button.setAttribute("aria-selected", k === i);
-    button.tabIndex = k === i ? 0 : -1;
-  });
+  tabs.forEach((button, k) => filled(button, { "aria-selected": k === i, tabindex: k === i ? 0 : -1 }));
   app.other = versions[i] ? "" : tabs[i].textContent;
   byId("view").hidden = Boolean(app.other);
   byId("wide").hidden = byId("about").hidden = Boolean(app.other);

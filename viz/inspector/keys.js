@@ -35,10 +35,10 @@ function approach(app, at) {
   setView(app, { k, x: width / 2 - k * (at.x + at.w / 2), y: k * at.h > height ? 12 - k * at.y : height / 2 - k * (at.y + at.h / 2) });
 }
 
-function zoom(app, factor, x, y) {
-  const { k, x: tx, y: ty } = app.seen;
-  const to = Math.max(0.04, Math.min(6, k * factor));
-  setView(app, { k: to, x: x - (x - tx) * to / k, y: y - (y - ty) * to / k });
+/** Zoom a view, so that what was at a place comes to x, y. */
+function zoom(app, factor, x, y, view = app.seen, from = { x, y }) {
+  const { k } = view, to = Math.max(0.04, Math.min(6, k * factor));
+  setView(app, { k: to, x: x - (from.x - view.x) * to / k, y: y - (from.y - view.y) * to / k });
 }
 
 /** Move the picture so that a node is in it. */
@@ -70,9 +70,8 @@ function listenToPointers(app, { hovered, clicked }) {
     if (!hold.moved) svg.setPointerCapture(event.pointerId); // before, a click would go to the whole picture
     hold.moved = true;
     if (!hold.two) { setView(app, { ...hold.view, x: hold.view.x + dx, y: hold.view.y + dy }); return; }
-    const now = spread(), { k, x, y } = hold.view;
-    const to = Math.max(0.04, Math.min(6, k * now.far / Math.max(1, hold.two.far)));
-    setView(app, { k: to, x: now.x - (hold.two.x - x) * to / k, y: now.y - (hold.two.y - y) * to / k });
+    const now = spread();
+    zoom(app, now.far / Math.max(1, hold.two.far), now.x, now.y, hold.view, hold.two);
   });
   const lift = (event) => {
     down.delete(event.pointerId);

@@ -64,8 +64,7 @@ function keepState(app) {
 }
 function copyView(app) {
   keepParts(viewInLink(app), false);
-  const words = (text) => { byId("copylink").textContent = text; };
-  copyLink((copied) => { words(copied ? "copied" : "it is in the address"); setTimeout(() => words("copy link"), 1500); });
+  copyByButton(byId("copylink"));
 }
 
 /** Show what the address says; what it says wrongly stays as it is. */

@@ -39,8 +39,7 @@ function armView(svg, motion) {
     points.forEach(([x, y], i) => {
       const [px, py] = motion.parents[i] < 0 ? [x, y] : points[motion.parents[i]];
       sticks[i].setAttribute("d", `M${px} ${-py}L${x} ${-y}`);
-      joints[i].setAttribute("cx", x);
-      joints[i].setAttribute("cy", -y);
+      filled(joints[i], { cx: x, cy: -y });
     });
     const past = motion.points.slice(Math.max(0, frame - 40), frame + 1).map((each) => `${each[last][0]} ${-each[last][1]}`);
     trace.setAttribute("d", `M${past.join("L")}`);

@@ -7,8 +7,8 @@ from dataclasses import replace
 from html import escape
 from string import Template
 
-from cgraph import Graph, Node, __version__
-from cgraph._shared import Array, Json, remarks_of, require_graph, require_mapping, require_sequence, require_texts
+from cgraph import Graph, Node, __version__, _shared
+from cgraph._shared import Array, Json
 
 from .. import theme
 from ..pages import html
@@ -103,35 +103,31 @@ def page(
     True
     """
     for what, text in (("title", title), ("about", about), ("view", view)):
-        if not isinstance(text, str):
-            raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
+        _shared.require_kind(f"{what} of a page", text, str, "text")
     if at is not None:
-        require_mapping("at", at, "input: value")
-    require_texts("names", names)
-    nodes = frozenset(require_sequence("marked", marked, "nodes", Node))
-    tables = require_sequence("tables", tables, "Table or StateTable", (Table, StateTable))
-    notices = require_sequence("notices", notices, "texts", str)
-    panels = require_sequence("panels", panels, "Panel", Panel)
+        _shared.require_mapping("at", at, "input: value")
+    _shared.require_texts("names", names)
+    nodes = frozenset(_shared.require_sequence("marked", marked, "nodes", Node))
+    tables = _shared.require_sequence("tables", tables, "Table or StateTable", (Table, StateTable))
+    notices = _shared.require_sequence("notices", notices, "texts", str)
+    panels = _shared.require_sequence("panels", panels, "Panel", Panel)
     if columns is not None:
-        parents = require_mapping("columns", columns, "tag: parent").values()
-        require_sequence("columns", [*columns, *[tag for tag in parents if tag is not None]], "tags", str)
+        parents = _shared.require_mapping("columns", columns, "tag: parent").values()
+        _shared.require_sequence("columns", [*columns, *[tag for tag in parents if tag is not None]], "tags", str)
     if derived is not None:
-        require_graph("derived", derived)
+        _shared.require_graph("derived", derived)
     versions = _versions(graph, about, nodes)
     if motion is not None:
-        if not isinstance(motion, Motion):
-            raise TypeError(f"motion must be a Motion, got {type(motion).__name__}: {motion!r:.60}")
-        motion.check()
+        _shared.require_kind("motion", motion, Motion).check()
     if names is None:
-        names = {name: text for version in versions for name, text in remarks_of(version.graph).names.items()}
+        names = {name: text for version in versions for name, text in _shared.remarks_of(version.graph).names.items()}
     if view and all(version.name != view for version in versions):
         raise ValueError(f"view must be one of the versions, got {view!r}: {[version.name for version in versions]}")
     introduction = "" if isinstance(graph, Graph) else about
     data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices), "view": view}
-    if not isinstance(causes, StateTable | None):
-        raise TypeError(f"causes must be a StateTable, got {type(causes).__name__}: {causes!r:.60}")
+    _shared.require_kind("causes", causes, StateTable | None, "a StateTable")
     live = [table for table in tables if isinstance(table, StateTable)]
-    units, state = require_texts("units", units), State(at or {}, derived)
+    units, state = _shared.require_texts("units", units), State(at or {}, derived)
     data |= record(versions, motion, names, units, state=state, columns=columns, tables=live, causes=causes)
     return compose(title, data, [table for table in tables if isinstance(table, Table)], panels)
 
@@ -160,7 +156,7 @@ def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table]
 def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[Node]) -> list[Version]:
     """The versions to switch among, checked; a graph alone is one."""
     if isinstance(graph, Graph):
-        known = remarks_of(graph)
+        known = _shared.remarks_of(graph)
         version = Version("graph", graph, about or known.words, marked)
         if marked or not known.outputs:
             return [version]
@@ -168,7 +164,7 @@ def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[No
     given: object = graph
     listed = isinstance(given, Sequence) and not isinstance(given, str)
     if not listed or not all(isinstance(each, Version) for each in graph):
-        require_graph("page", graph)
+        _shared.require_graph("page", graph)
     if marked:
         raise ValueError("with versions, give each its own marked nodes")
     names = [version.name for version in graph]

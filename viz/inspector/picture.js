@@ -55,17 +55,15 @@ function drawTitles({ plan, layout, frames, titles, names, version }) {
   for (const each of layout.titles) {
     if (each.column === undefined || !used.has(plan.columns[each.column])) continue; // an empty column is not drawn
     const name = plan.columns[each.column];
-    const group = element("g", { class: "column", "data-column": each.column, tabindex: -1, role: "button" }, frames);
-    group.setAttribute("aria-label", `fold ${name || "no tag"} to one box`);
+    const group = element("g", { class: "column", "data-column": each.column, tabindex: -1, role: "button", "aria-label": `fold ${name || "no tag"} to one box` }, frames);
     element("rect", { x: each.x - 6, y: each.y, width: each.w + 12, height: each.h, rx: 8 }, group);
-    const words = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 17 }, titles);
-    words.textContent = fitted(name || "no tag", NAME.most);
-    names.push({ text: words, name: name || "no tag", width: each.w, size: 13 });
-    element("title", {}, group).textContent = name;
+    const text = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 17 }, titles, fitted(name || "no tag", NAME.most));
+    names.push({ text, name: name || "no tag", width: each.w, size: 13 });
+    element("title", {}, group, name);
   }
   for (const each of layout.titles) {
     const { stage, x, y } = each; // an empty row is not named
-    if (each.columns?.some((column) => rows.has(`${column} ${stage}`))) element("text", { class: "stage", x, y }, titles).textContent = stage;
+    if (each.columns?.some((column) => rows.has(`${column} ${stage}`))) element("text", { class: "stage", x, y }, titles, stage);
   }
 }
 
@@ -83,11 +81,8 @@ function drawBodies(canvas) {
     const name = plan.columns[column] || "no tag", at = layout.bodies[column];
     const wrong = nodes.filter((node) => version.marked.has(node)).length;
     const second = wrong ? `${wrong} of ${nodes.length} spurious` : counted(nodes.length, "node");
-    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, "", second);
+    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, "", second, { "data-column": column, "aria-label": `${name}, ${second}, folded` }, name);
     writeName(item.label, name, NAME.line);
-    item.group.setAttribute("data-column", column);
-    item.group.setAttribute("aria-label", `${name}, ${second}, folded`);
-    element("title", {}, item.group).textContent = name;
     canvas.names.push({ text: item.label, name, width: at.w + 4, size: 13, height: at.h - 14 });
     share(item.group, at, nodes.map((node) => roleOf(version, node)));
     keep(canvas, `b${column}`, item, nodes, second);
@@ -123,19 +118,15 @@ function drawClusters(canvas) {
     const role = cluster.marked ? "wrong" : roles.size === 1 ? [...roles][0] : "several";
     const words = titleOf(cluster), count = counted(inside[c].length, "node");
     if (!view.folded.has(c)) {
-      const group = element("g", { class: `frame ${role}`, "data-cluster": c, tabindex: -1, role: "button" }, frames);
-      group.setAttribute("aria-label", `fold ${cluster.column} ${words}, ${count}`);
+      const group = element("g", { class: `frame ${role}`, "data-cluster": c, tabindex: -1, role: "button", "aria-label": `fold ${cluster.column} ${words}, ${count}` }, frames);
       element("rect", { x: at.x, y: at.y, width: at.w, height: at.h, rx: 6 }, group);
-      element("text", { x: at.x + 6, y: at.y + 13 }, group).textContent = `▾ ${words ? `${words} (${inside[c].length})` : count}`;
+      element("text", { x: at.x + 6, y: at.y + 13 }, group, `▾ ${words ? `${words} (${inside[c].length})` : count}`);
       return;
     }
     const first = cluster.marked ? "spurious" : cluster.title;
-    const item = shape(shapes, `c${c}`, at, `box ${role}`, foldedTitle(cluster, inside[c].length), count);
-    item.group.setAttribute("data-cluster", c);
-    item.group.setAttribute("aria-expanded", "false");
-    item.group.setAttribute("aria-label", [cluster.column, cluster.stage, cluster.marked ? cluster.title : "", [first, count].filter(Boolean).join(" "), "folded"].filter(Boolean).join(", "));
-    element("title", {}, item.group).textContent = [cluster.column, words, cluster.stage, count].filter(Boolean).join(", ");
-    keep(canvas, `c${c}`, item, inside[c], count);
+    const told = [cluster.column, cluster.stage, cluster.marked ? cluster.title : "", [first, count].filter(Boolean).join(" "), "folded"].filter(Boolean).join(", ");
+    const attributes = { "data-cluster": c, "aria-expanded": "false", "aria-label": told }, title = [cluster.column, words, cluster.stage, count].filter(Boolean).join(", ");
+    keep(canvas, `c${c}`, shape(shapes, `c${c}`, at, `box ${role}`, foldedTitle(cluster, inside[c].length), count, attributes, title), inside[c], count);
   });
 }
 
@@ -160,13 +151,10 @@ function drawNodes(canvas) {
       at = { x: box.x + (box.w - innerOf(plan, c).width) / 2 + x[i] - w / 2, y: box.y + BOX.title + y[i] - NODE / 2, w, h: NODE };
     }
     const role = roleOf(version, node), switches = ROWS[op]?.switches;
-    const item = shape(shapes, `n${node}`, at, `${leaf ? "leaf" : "node"} ${role}${switches ? " switch" : ""}`, caption(version, node), "", !leaf);
-    item.group.setAttribute("data-node", node);
     const name = version.names[node] && (called.get(version.names[node][0]) ?? version.names[node][0]);
     const words = [leaf ? "" : `%${version.number[node]}`, name ?? op, role === "wrong" ? "spurious" : "", switches ? "switches: its value or its slope jumps" : ""].filter(Boolean).join(", ");
-    item.group.setAttribute("aria-label", words);
-    element("title", {}, item.group).textContent = words;
-    keep(canvas, `n${node}`, item, [node], "");
+    const kind = `${leaf ? "leaf" : "node"} ${role}${switches ? " switch" : ""}`, attributes = { "data-node": node, "aria-label": words };
+    keep(canvas, `n${node}`, shape(shapes, `n${node}`, at, kind, caption(version, node), "", attributes, words, !leaf), [node], "");
   });
 }
 
@@ -178,9 +166,8 @@ function drawBundles(canvas, side, leaves) {
     if (key[0] !== side || !own.length) continue;
     const kind = key.slice(1), off = side === "o" && own.some((name) => version.off.has(name));
     const at = layout[side === "i" ? "inputs" : "outputs"].get(key);
-    const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : off ? "box output off" : "box output", `▸ ${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, "");
-    item.group.setAttribute("data-bundle", key);
-    item.group.setAttribute("aria-label", `${kind}: ${counted(own.length, side === "i" ? "input" : "output")}, folded${off ? ", wrong" : ""}`);
+    const said = `${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, attributes = { "data-bundle": key, "aria-label": `${said}, folded${off ? ", wrong" : ""}` };
+    const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : off ? "box output off" : "box output", `▸ ${said}`, "", attributes);
     canvas.names.push({ text: item.label, name: item.label.textContent, width: at.w - 8, size: 10 });
     const nodes = own.map((name) => node.get(name));
     if (side === "i") keep(canvas, `k${key}`, item, nodes, "");
@@ -197,24 +184,21 @@ function drawOutputs(canvas) {
   for (const [name, pretty, node] of version.outputs) {
     const at = layout.outputs.get(name);
     if (!at) continue;
-    const item = shape(shapes, `o${name}`, at, version.off.has(name) ? "output off" : "output", pretty, "");
-    item.group.setAttribute("data-node", node);
-    item.group.setAttribute("aria-label", `output ${called.get(name) ?? name}${version.off.has(name) ? ", wrong" : ""}`);
-    element("title", {}, item.group).textContent = called.get(name) ?? name;
+    const title = called.get(name) ?? name, off = version.off.has(name), attributes = { "data-node": node, "aria-label": `output ${title}${off ? ", wrong" : ""}` };
+    const item = shape(shapes, `o${name}`, at, off ? "output off" : "output", pretty, "", attributes, title);
     canvas.items.set(`o${name}`, { ...item, nodes: [node], output: true, names: [name] });
   }
 }
 
-/** One shape with its text, and a line for its value. */
-function shape(parent, id, at, kind, words, second, round = false) {
-  const group = element("g", { id, class: `item ${kind}`, tabindex: -1, role: "button" }, parent);
+/** One shape with its text, a line for its value, and what is told of it. */
+function shape(parent, id, at, kind, words, second, attributes, title = null, round = false) {
+  const group = element("g", { id, class: `item ${kind}`, tabindex: -1, role: "button", ...attributes }, parent);
   element("rect", { class: "shape", x: at.x, y: at.y, width: at.w, height: at.h, rx: round ? at.h / 2 : 5 }, group);
   const tall = at.h > 40;
-  const label = element("text", { class: "label", x: at.x + at.w / 2, y: at.y + (tall ? 18 : at.h / 2 - 2) }, group);
-  label.textContent = words;
+  const label = element("text", { class: "label", x: at.x + at.w / 2, y: at.y + (tall ? 18 : at.h / 2 - 2) }, group, words);
   group.append(" "); // else what is read aloud has the two as one word
-  const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + (tall ? at.h - 12 : at.h - 4) }, group);
-  value.textContent = second;
+  const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + (tall ? at.h - 12 : at.h - 4) }, group, second);
+  if (title !== null) element("title", {}, group, title);
   return { group, label, value, at };
 }
 
@@ -237,7 +221,7 @@ function drawArrows({ version, items, shownBy, lines, layout }, drawing) {
     const path = element("path", {
       class: `line${wrong ? " wrong" : ""}${near ? " near" : ""}`, d, "stroke-width": width, "data-from": from, "data-to": to,
     }, lines);
-    if (pairs.length > 1) element("title", {}, path).textContent = `${pairs.length} edges`;
+    if (pairs.length > 1) element("title", {}, path, `${pairs.length} edges`);
     return { path, from, to, pairs };
   });
 }

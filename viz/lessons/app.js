@@ -83,18 +83,16 @@ const LINKS = SCREENS.map((screen, i) => {
 ASKING.forEach((screen, i) =>
   screen.querySelectorAll(".choice").forEach((button, k) => button.addEventListener("click", () => guess(i, k))));
 document.querySelectorAll("a.term").forEach((link) => {
-  link.setAttribute("role", "button");
-  link.setAttribute("aria-expanded", "false");
+  filled(link, { role: "button", "aria-expanded": "false" });
   link.addEventListener("click", (event) => { event.preventDefault(); explain(link); });
 });
 const SCORE = tag("output", { "aria-live": "polite" });
-const AGAIN = tag("button", { type: "button" }, "Start again");
-AGAIN.addEventListener("click", () => {
+document.querySelector("nav").append(...LINKS, SCORE);
+button(document.querySelector("nav"), "Start again", () => {
   STATE.guesses = ASKING.map(() => null);
   ASKING.forEach((screen) => { screen.querySelector(".reveal").open = false; });
   go(0);
 });
-document.querySelector("nav").append(...LINKS, SCORE, AGAIN);
 document.body.classList.add("stepped");
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("input")) return;

@@ -1,10 +1,11 @@
-"""Lessons on a system: screens of one subject on a page that loads nothing; a worksheet, and its key."""
+"""Lessons on a system: screens of one subject on a page that loads nothing; a worksheet to be printed, and its key."""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Sequence
-from html import escape
+from html import escape, unescape
 from typing import NamedTuple
 
 from cgraph import Graph
@@ -13,6 +14,8 @@ from dynamics.scenes.scenes import names
 from dynamics.systems.model import Model
 
 from ..graph_drawing.render import check_can_draw
+from ..models.equations import model_equations
+from ..models.equations_text import equations_latex
 from ..pages import html
 from ..pages.html import Page, asset, html_target
 from .glossary import glossary
@@ -27,7 +30,6 @@ from .screens.sweeps import backward_sweep, formula_graph, forward_sweep
 from .screens.torque_parts import torque_parts
 from .screens.wrong_way import wrong_way
 from .subject import Subject, subject_of
-from .worksheet import worksheet
 
 
 class Lesson(NamedTuple):
@@ -50,6 +52,8 @@ LESSONS = {
     "loops": Lesson("A constraint and its force", MINUTES + 5, (closed_loop,)),
     "energy": Lesson("Energy and the size of a step", MINUTES + 5, (energy_and_step,)),
 }
+LINES = 40  # of LaTeX, of each formula
+WIDEST = 112  # letters of a formula in a line of paper
 TRIALS = 20  # orders of the choices
 FORMS = ("page", "worksheet", "key")
 
@@ -115,11 +119,13 @@ def lesson(
     check_can_draw(png=False)
     on = subject_of(model)
     screens = arranged([screen(on) for screen in chosen.screens], f"{subject} {on.scene.name} {' '.join(on.joints)}")
-    heading = title or chosen.title
+    heading = f"{'Key: ' * (form == 'key')}{title or chosen.title}"
+    by = f'<p class="by">{escape(author)}</p>' if author else ""
+    head = f"<header><h1>{escape(heading)}</h1>{by}</header>"
     if form == "page":
-        text = page(on, screens, heading, author, subject)
+        text = page(on, screens, heading, head, subject)
     else:
-        text = worksheet(on, screens, heading, author, key=form == "key")
+        text = worksheet(on, screens, heading, head, key=form == "key")
     if target is not None:
         write_files({target: text})
     return text
@@ -134,7 +140,7 @@ def arranged(screens: Sequence[Screen], seed: str) -> list[Screen]:
     return made
 
 
-def page(subject: Subject, screens: Sequence[Screen], title: str, author: str, chosen: str) -> Page:
+def page(subject: Subject, screens: Sequence[Screen], title: str, head: str, chosen: str) -> Page:
     """The page of the screens of a lesson, of its name in `LESSONS`, between the introduction and the end."""
     data = {
         "answers": [screen.answer for screen in screens],
@@ -143,7 +149,6 @@ def page(subject: Subject, screens: Sequence[Screen], title: str, author: str, c
     }
     modules = ", ".join([str((screen.play or {}).get("modules", "{}")) for screen in screens])
     body = "\n".join([screen.to_html(k) for k, screen in enumerate(screens, start=1)])
-    by = f'<p class="by">{escape(author)}</p>' if author else ""
     start = (
         f'<section class="screen" id="start">\n<h2>Before you begin <small>{MINUTES} minutes</small></h2>\n'
         f"<p>About {LESSONS[chosen].minutes} minutes, for those who know derivatives. On every screen predict first, then reveal. Keys: A to "
@@ -155,7 +160,7 @@ def page(subject: Subject, screens: Sequence[Screen], title: str, author: str, c
     text = f"{start}\n{body}\n{_end(subject, chosen)}"
     return html.compose(
         title,
-        f'<header><h1>{escape(title)}</h1>{by}</header>\n<nav aria-label="Screens"></nav>\n<main>\n{text}\n{glossary(text)}\n</main>',
+        f'{head}\n<nav aria-label="Screens"></nav>\n<main>\n{text}\n{glossary(text)}\n</main>',
         asset(__package__, "lesson.css"),
         f'"use strict";\nconst MODULES = [{modules}];\n{scripts()}\n{asset(__package__, "app.js")}',
         {"data": data},
@@ -189,3 +194,26 @@ def _end(subject: Subject, chosen: str) -> str:
         f'<section class="screen" id="end">\n<h2>The end</h2>\n{seen}<p class="score"></p>\n'
         f"<h3>Next lessons</h3>\n<ul>{rows}</ul>\n</section>"
     )
+
+
+def worksheet(subject: Subject, screens: Sequence[Screen], title: str, head: str, *, key: bool) -> Page:
+    """The page of a worksheet, or of its key."""
+    lines = "".join([f"<span>{label}</span>" for label in ("Name", "Class", "Date")])
+    body = "\n".join([screen.paper_html(k, key=key) for k, screen in enumerate(screens, start=1)])
+    if key:
+        latex = escape(equations_latex(model_equations(subject.scene), LINES))
+        text = f'{body}\n<section id="latex"><h2>Equations as LaTeX</h2>\n<pre>{latex}</pre></section>'
+    else:
+        text = f'<p class="fill">{lines}</p>\n<section id="start"><h2>Before you begin</h2>\n{introduction(subject)}</section>\n{body}'
+    text = re.sub(r'<math display="block">(?=(.*?)</math>)', _fitted, text, flags=re.DOTALL)
+    return html.compose(
+        title,
+        f"{head}\n<main>\n{text}\n{'' if key else glossary(text).replace('<details', '<details open', 1)}\n</main>",
+        asset(__package__, "worksheet.css"),
+    )
+
+
+def _fitted(found: re.Match[str]) -> str:
+    """A formula as small as its widest row needs: paper has no scroll bar."""
+    letters = max([len(unescape(re.sub("<[^>]*>", "", row))) for row in found[1].split("</mtr>")])
+    return found[0] if letters <= WIDEST else f'{found[0][:-1]} style="font-size: {WIDEST / letters:.2f}em">'

@@ -13,14 +13,13 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph
 from cgraph._shared import Array
-from dynamics import Verdict, display_names, formulation_verdict
+from dynamics import System, Verdict, display_names, formulation_verdict
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.integrators import TABLEAUS
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.scenes.scenes import Scene, of_model, two_link
 from dynamics.scenes.start import moving_start
 from dynamics.systems.model import Model
-from dynamics.systems.system import System
 
 from .. import theme
 from ..graph_drawing.render import render_svg

@@ -22,9 +22,8 @@ function liveCourse(svg, words, machine, data, state) {
   const dots = indices.map((i) => shape("circle", { class: `live-joint live-course-${i}`, r: 4 }));
   const axes = shape("g", { class: "live-axes" });
   svg.prepend(axes);
-  svg.setAttribute("viewBox", `0 0 ${WIDE} ${HIGH}`);
   svg.classList.add("live-plot");
-  svg.setAttribute("aria-label", "coordinates over time, and thin in green the same with much shorter steps");
+  filled(svg, { viewBox: `0 0 ${WIDE} ${HIGH}`, "aria-label": "coordinates over time, and thin in green the same with much shorter steps" });
   words.classList.add("live-legend");
   const rest = positions - indices.length;
   words.replaceChildren(
@@ -67,8 +66,7 @@ function liveCourse(svg, words, machine, data, state) {
     now.setAttribute("d", `M${x} ${EDGE.top}V${HIGH - EDGE.bottom}`);
     dots.forEach((dot, i) => {
       const y = up(machine.run[i]), seen = Math.abs(y) < 1e4;
-      dot.setAttribute("visibility", seen ? "visible" : "hidden");
-      if (seen) { dot.setAttribute("cx", x); dot.setAttribute("cy", y.toFixed(2)); }
+      filled(dot, seen ? { visibility: "visible", cx: x, cy: y.toFixed(2) } : { visibility: "hidden" });
     });
   }
   return draw;

@@ -105,22 +105,17 @@ function startLive() {
     [[sticks, values, 1.6 * r], [reference, right, 0.7 * r]].forEach(([paths, at, width]) => paths.forEach((path, k) => {
       const [x, y] = place(at, k), parent = data.parents[k];
       const [px, py] = parent < 0 ? [x, y] : place(at, parent);
-      const whole = [x, y, px, py].every(Number.isFinite);
-      path.setAttribute("d", whole ? `M${px} ${py}L${x} ${y}` : "");
-      path.setAttribute("stroke-width", width);
+      filled(path, { d: [x, y, px, py].every(Number.isFinite) ? `M${px} ${py}L${x} ${y}` : "", "stroke-width": width });
     }));
     joints.forEach((circle, k) => {
       const [x, y] = place(values, k);
-      circle.setAttribute("r", Number.isFinite(x) ? r : 0);
-      circle.setAttribute("stroke-width", r / 3);
-      if (Number.isFinite(x)) { circle.setAttribute("cx", x); circle.setAttribute("cy", y); }
+      filled(circle, Number.isFinite(x) ? { cx: x, cy: y, r, "stroke-width": r / 3 } : { r: 0 });
     });
     if (playing) past.push(place(values, points - 1));
     if (past.length > TRACE) past.shift();
     if (!state.time) past.length = 0;
     const drawn = past.filter((each) => each.every(Number.isFinite));
-    trace.setAttribute("d", drawn.length > 1 ? `M${drawn.map(([x, y]) => `${x} ${y}`).join("L")}` : "");
-    trace.setAttribute("stroke-width", r / 3);
+    filled(trace, { d: drawn.length > 1 ? `M${drawn.map(([x, y]) => `${x} ${y}`).join("L")}` : "", "stroke-width": r / 3 });
   }
   const curves = ["kinetic", "potential", "energy"].map((name) => element("path", { class: `live-${name}` }, $("strip")));
   function drawStrip(values) {

@@ -10,10 +10,9 @@ import cgraph as cg
 from cgraph import Graph, GraphError
 from cgraph._shared import Json, or_nearest
 from cgraph.extend import Names, cotangents
-from dynamics import display_names, torque_by_cause
+from dynamics import Scene, display_names, torque_by_cause
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.multibody.quantities.torque_causes import SPURIOUS
-from dynamics.scenes import Scene
 from dynamics.systems.kinematics import ONE, changes
 
 BAR, BODIES, ZEROS = 24, 6, 6  # characters of the longest bar; bodies listed of a cause; names listed of what is 0

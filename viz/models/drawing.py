@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from cgraph import Graph, Node
 from cgraph._shared import check_writable, require_path, write_files
-from dynamics import display_names, scenes
-from dynamics.equations.formulations.verdict import Verdict, formulation_verdict
-from dynamics.equations.state_equation import state_equation
+from dynamics import Verdict, display_names, formulation_verdict, scenes, state_equation
 from dynamics.systems.model import Model
 
 from ..graph_drawing.dot import to_dot
@@ -100,7 +98,6 @@ def judged_drawing(graph: Graph, verdict: Verdict | None, **options: Any) -> Dig
 
     options: as of `to_dot`.
     """
-    if verdict is None:
-        return to_dot(graph, **options)
-    wrong = tuple(verdict.excess)
-    return to_dot(graph, marked=verdict.nodes, marked_edges=verdict.edges, wrong_outputs=wrong, **options)
+    if verdict is not None:
+        options |= {"marked": verdict.nodes, "marked_edges": verdict.edges, "wrong_outputs": tuple(verdict.excess)}
+    return to_dot(graph, **options)

@@ -3,47 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Node
 from cgraph._shared import Array, real_array, real_number
-from dynamics.equations.formulations.formulations import inverse_dynamics
+from dynamics import Trajectory, inverse_dynamics, simulate
 from dynamics.scenes import of_model
-from dynamics.simulation.simulate import simulate
-from dynamics.simulation.trajectory import Trajectory
 from dynamics.systems.model import Model
 
 SWING = 0.5  # rad, and the unit of any other coordinate: how far the wanted motion goes
 DT = 1e-3  # s, the step that the embedded formulations take
 
 
-@dataclass(frozen=True)
-class Swing:
-    """A wanted motion: every coordinate swings by half a radian and back, from rest to rest.
-
-    q0: the start, (n,).  period: how long it takes [s].
-    """
-
-    q0: tuple[float, ...]
-    period: float
-
-    def __call__(self, t: Array) -> Array:
-        """The coordinates at times (T,), (T, n)."""
-        moved = SWING * 0.5 * (1.0 - np.cos(2.0 * math.pi / self.period * real_array("t", t)))
-        return np.array(self.q0) + moved[:, np.newaxis]
-
-    def nodes(self, t: Node) -> tuple[list[Node], Node, Node]:
-        """Coordinates at a time, their common velocity and their common acceleration."""
-        rate = 2.0 * math.pi / self.period
-        moved = 0.5 * SWING * (1.0 - cg.cos(rate * t))
-        velocity, acceleration = 0.5 * SWING * rate * cg.sin(rate * t), 0.5 * SWING * rate**2 * cg.cos(rate * t)
-        return [start + moved for start in self.q0], velocity, acceleration
-
-
-def driven(model: Model, formulation: str = "chain_rule", t_end: float | None = None) -> tuple[Trajectory, Swing]:
+def driven(
+    model: Model, formulation: str = "chain_rule", t_end: float | None = None
+) -> tuple[Trajectory, Callable[[Array], Array]]:
     """The motion of a model under the torques of a formulation of inverse dynamics, and the motion that was wanted.
 
     Wanted is that every coordinate swings by half a radian (or half a unit) and back. The torques are computed
@@ -62,7 +39,7 @@ def driven(model: Model, formulation: str = "chain_rule", t_end: float | None = 
     -------
     Trajectory
         How the model moves.
-    Swing
+    callable
         How it should: a function of times (T,) to coordinates (T, n).
 
     Raises
@@ -90,14 +67,18 @@ def driven(model: Model, formulation: str = "chain_rule", t_end: float | None = 
     end = scene.t_end if t_end is None else real_number("t_end", t_end)
     if not 0.0 < end < math.inf:
         raise ValueError(f"t_end must be positive and finite, got {end!r} s")
-    wanted = Swing(scene.q, end)
-    graph = inverse_dynamics(system, formulation)
+    rate, graph = 2.0 * math.pi / end, inverse_dynamics(system, formulation)
+
+    def wanted(t: Array) -> Array:
+        moved = SWING * 0.5 * (1.0 - np.cos(rate * real_array("t", t)))
+        return np.array(scene.q) + moved[:, np.newaxis]
 
     def torques(_q: object, _qd: object, t: Node) -> list[Node]:
-        q, qd, qdd = wanted.nodes(t)
+        moved = 0.5 * SWING * (1.0 - cg.cos(rate * t))
+        qd, qdd = 0.5 * SWING * rate * cg.sin(rate * t), 0.5 * SWING * rate**2 * cg.cos(rate * t)
         values: dict[str, Node | float] = {name: cg.variable(name) for name in system.parameters}
         values |= {"t": t, "dt": DT}
-        for i, place in enumerate(q):
+        for i, place in enumerate([start + moved for start in scene.q]):
             values |= {f"q{i}": place, f"qd{i}": qd, f"qdd{i}": qdd}
             values |= {f"q{i}_old": place - DT * qd, f"qd{i}_old": qd - DT * qdd}
         return list(graph(**{name: values[name] for name in graph.input_names}).values())

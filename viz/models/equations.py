@@ -11,7 +11,6 @@ from cgraph._shared import Side, counted, ink, is_letter, reading_form
 from cgraph.extend import Builder, cotangents
 from dynamics.equations.constraints.constraints import Rows, constraint_rows
 from dynamics.equations.formulations.lagrange_terms import Embedding
-from dynamics.scenes import Scene
 from dynamics.systems.kinematics import ONE, ZERO
 
 from ..pages.mathml import ranks
@@ -63,7 +62,7 @@ class Equations:
 
 
 def model_equations(
-    scene: Scene, *, of: str = "torque", formulation: str = "chain_rule", compare: Sequence[str] = ()
+    scene: dyn.Scene, *, of: str = "torque", formulation: str = "chain_rule", compare: Sequence[str] = ()
 ) -> Equations:
     """The equations of a scene: Lagrangian, momenta, what is conserved, and the torque or what else is asked for.
 
@@ -97,7 +96,7 @@ def model_equations(
     return Equations(blocks, {**names, **more, **parts}, indices)
 
 
-def _short_names(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
+def _short_names(scene: dyn.Scene) -> tuple[dict[str, str], dict[str, str]]:
     """Display names, and what indices stand for: of names alike but for a number at their end, the number."""
     names, called = dyn.display_names(scene), dict.fromkeys((*scene.coordinates, *scene.velocities))
     matches = {name: re.fullmatch(r"(.*[^0-9])([0-9]+)", name) for name in called}
@@ -111,19 +110,19 @@ def _short_names(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
     return short, {number: name for name, number in index.items()}
 
 
-def _statements(graph: Graph, order: Mapping[str, int] | None = None) -> list[tuple[Side, ...]]:
+def _statements(graph: Graph, order: Mapping[str, int] | None = None) -> list[tuple[Node, Node]]:
     """Each output of a graph and what it is.  order: ranks of the inputs, see `reading_form`."""
     largest = LARGEST if len(graph.input_names) <= FEW_INPUTS else LARGEST // 3
     rights = reading_form(list(graph.outputs.values()), order or ranks(graph.input_names), largest)
     return [(variable(name), right) for name, right in zip(graph.outputs, rights, strict=True)]
 
 
-def _lagrangian(scene: Scene, indices: Mapping[str, str]) -> tuple[Block, dict[str, str]]:
+def _lagrangian(scene: dyn.Scene, indices: Mapping[str, str]) -> tuple[Block, dict[str, str]]:
     """L, a long one as the sum of its partial Lagrangians; and {variable that stands for one: what it is called}."""
     system = scene.system
     graph = cg.simplify(system.graph({"L": system.lagrangian}, system.q, system.qd))
     whole, parts = _statements(graph), system.partial_lagrangians
-    if ink(_right(whole[0])) <= EXPLICIT or len(parts) < 2:
+    if ink(whole[0][1]) <= EXPLICIT or len(parts) < 2:
         return Block("Lagrangian", whole), {}
     bodies = [] if scene.mechanism is None else [body.name for body in scene.mechanism.moving]
     called = bodies if len(bodies) == len(parts) else [str(k + 1) for k in range(len(parts))]
@@ -137,17 +136,11 @@ def _lagrangian(scene: Scene, indices: Mapping[str, str]) -> tuple[Block, dict[s
     return Block("Lagrangian", [*total, *_statements(of_parts)], said), names
 
 
-def _right(statement: tuple[Side, ...]) -> Node:
-    right = statement[-1]
-    assert isinstance(right, Node)
-    return right
-
-
-def _conserved(scene: Scene) -> list[Block]:
+def _conserved(scene: dyn.Scene) -> list[Block]:
     """What is constant in every motion without tau; no block where nothing is known to be."""
     quantities = dyn.conserved(scene).quantities
     held = [statement for graph in quantities.values() for statement in _statements(graph)]
-    if held and not [*quantities][-1].startswith("p.") and ink(_right(held[-1])) > EXPLICIT:
+    if held and not [*quantities][-1].startswith("p.") and ink(held[-1][1]) > EXPLICIT:
         held[-1] = held[-1][0], variable("qd") * variable("p") - variable("L")
     said = f"Constant while no τ acts: {', '.join(quantities)}. Of momenta, those of cyclic coordinates only."
     return [Block("Conserved", held, said)] if held else []
@@ -164,7 +157,7 @@ def _constraints(system: dyn.System, rows: Rows) -> Block:
     return Block("Constraints", held, f"Their forces are Jᵀλ, J the slopes of their rates by velocities.{said}")
 
 
-def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
+def _torque(scene: dyn.Scene, formulation: str, rows: Rows) -> list[Block]:
     """The torque: written out where that is short, else by its matrices if these are small, else as in the graph."""
     system, graph = scene.system, dyn.inverse_dynamics(scene, formulation)
     chain_rule, title = formulation == "chain_rule", f"Torque, {formulation.replace('_', ' ')}"
@@ -176,16 +169,16 @@ def _torque(scene: Scene, formulation: str, rows: Rows) -> list[Block]:
         graph = cg.simplify(Graph([*graph.inputs, *rows.multipliers], torques))
     explicit = _statements(graph)
     title = f"{'Torque, τ = dp/dt − ∂L/∂q' if chain_rule else title}{' − Jᵀλ' * bool(rows.kept)}"
-    short = all(ink(_right(each)) <= (EXPLICIT if system.n <= 2 else BRIEF) for each in explicit)
+    short = all(ink(right) <= (EXPLICIT if system.n <= 2 else BRIEF) for _, right in explicit)
     small = chain_rule and 2 <= system.n <= MATRICES
     blocks = [Block(title, explicit)] * (short or not small)
     return [*blocks, _by_matrices(system, rows)] if small else blocks
 
 
-def _accelerations(scene: Scene, rows: Rows) -> list[Block]:
+def _accelerations(scene: dyn.Scene, rows: Rows) -> list[Block]:
     """Accelerations and multipliers written out where that is short; else, or of few, the system that they solve."""
     explicit = _statements(dyn.forward_dynamics(scene))
-    short = all(ink(_right(each)) <= EXPLICIT for each in explicit)
+    short = all(ink(right) <= EXPLICIT for _, right in explicit)
     said = "" if short else "The accelerations written out are too long to print; they are what solves this. "
     by_matrices = [_by_matrices(scene.system, rows, said)] if scene.system.n > 1 or not short else []
     return [*[Block("Accelerations", explicit)] * short, *by_matrices]
@@ -245,17 +238,17 @@ def _by_matrices(system: dyn.System, rows: Rows, said: str | None = None) -> Blo
     return Block(f"{'Accelerations' if solved else 'Torque'} by matrices", held, f"{said or ''}{about}.")
 
 
-def _spurious(scene: Scene, formulation: str) -> list[Block]:
+def _spurious(scene: dyn.Scene, formulation: str) -> list[Block]:
     """What a formulation with Euler's step has too much, where it has."""
     verdict, system = dyn.formulation_verdict(scene, formulation), scene.system
     quasi = system.kinematics.quasi is not None
     if not verdict.differs or verdict.terms is None or not verdict.excess:
         return []
     terms = {name: node for name, node in verdict.terms.outputs.items() if node.value != 0.0}
-    rights = map(_right, _statements(Graph(verdict.terms.inputs, terms)))
+    known = _statements(Graph(verdict.terms.inputs, terms))
     held: list[tuple[Side, ...]] = []
     energy, had = EMBEDDED[formulation]
-    for name, right in zip(terms, rights, strict=True):
+    for name, (_, right) in zip(terms, known, strict=True):
         if right.value == 0.0:
             continue
         i = name.removeprefix("tau")

@@ -7,22 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import cgraph as cg
+import dynamics as dyn
 from cgraph import Graph, Node
 from cgraph._shared import Array, counted, real_number
 from cgraph.extend import topological
-from dynamics.equations.equations_of_motion import forward_dynamics, momentum
-from dynamics.equations.formulations.formulations import inverse_dynamics
-from dynamics.equations.formulations.verdict import formulation_verdict
-from dynamics.equations.momentum.legendre import is_quadratic
-from dynamics.equations.state_equation import state_equation
-from dynamics.equations.torque_parts.torque_decomposition import torque_by_link
+from dynamics.equations.momentum.hamiltonian import is_quadratic
 from dynamics.multibody.bodies.joint_coordinates import display_units
-from dynamics.multibody.quantities.torque_causes import torque_by_cause
 from dynamics.multibody.trees.joint_positions import skeleton
-from dynamics.scenes import Scene
-from dynamics.simulation.simulate import simulate
-from dynamics.systems.model import display_names
-from dynamics.systems.system import System
 
 from .. import theme
 from ..inspector import Motion, StateTable, Step, Version
@@ -62,7 +53,7 @@ class Inspection:
 
 
 def inspection(
-    scene: Scene, *, t_end: float | None = None, say: Callable[[str], None] = lambda line: None
+    scene: dyn.Scene, *, t_end: float | None = None, say: Callable[[str], None] = lambda line: None
 ) -> Inspection:
     """All equations of a scene along its free motion: inverse dynamics by the formulations, forward dynamics, momenta.
 
@@ -80,9 +71,9 @@ def inspection(
     system = scene.system
     count = counted(system.nq, "coordinate")
     say(f"{scene.name}: deriving the equations of {count}, compiling them, and a motion of {end:g} s")
-    run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
+    run = dyn.simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
-    rate = forward_dynamics(system)
+    rate = dyn.forward_dynamics(system)
     state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t, "dt": DT}
     found = rate.evaluate({name: state[name] for name in rate.input_names})
     qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
@@ -95,7 +86,7 @@ def inspection(
         versions[name] = _version(scene, name)
     about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
     about += " With them come the forces that hold the constraints." if system.constraints else ""
-    steps = elimination(rate, display_names(scene))
+    steps = elimination(rate, dyn.display_names(scene))
     versions[FORWARD] = Version(FORWARD, rate, about, steps=steps, group=FORWARD)
     say(f"{scene.name}: deriving Hamilton's equations, and the state equation beside them")
     lacking = ""
@@ -107,7 +98,7 @@ def inspection(
     places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
     graphs = [*[each.graph for each in versions.values()], derived, *([places.graph] if places is not None else [])]
-    inputs, by_cause = {name for graph in graphs for name in graph.input_names}, torque_by_cause(scene)
+    inputs, by_cause = {name for graph in graphs for name in graph.input_names}, dyn.torque_by_cause(scene)
     rows = {f"tau{i}": [f"tau{i}_{k}" for k in range(len(by_cause.rows))] for i in range(system.n)}
     return Inspection(
         versions,
@@ -123,7 +114,7 @@ def inspection(
     )
 
 
-def _hamilton(scene: Scene) -> list[Version]:
+def _hamilton(scene: dyn.Scene) -> list[Version]:
     """The two forms of the equations, in momenta and in velocities. Raises as `hamilton_equations` does."""
     forms = both_forms(scene)
     hamilton, system, sizes = forms[HAMILTON], scene.system, form_sizes(forms)
@@ -137,16 +128,16 @@ def _hamilton(scene: Scene) -> list[Version]:
         "The same motion by accelerations: at the velocities of these momenta, torque less bias, solved. "
         f"{counted(depth[LAGRANGE], 'operation')} deep, {len(forms[LAGRANGE].nodes)} nodes."
     )
-    steps = elimination(hamilton, display_names(scene)) if is_quadratic(system) else ()
+    steps = elimination(hamilton, dyn.display_names(scene)) if is_quadratic(system) else ()
     return [
         Version(HAMILTON, hamilton, about, steps=steps, rows=form_rows(hamilton), group=MOMENTUM),
         Version(LAGRANGE, forms[LAGRANGE], beside, rows=form_rows(forms[LAGRANGE]), group=MOMENTUM),
     ]
 
 
-def _first_order(scene: Scene, end: float, times: Array | None) -> Inspection:
-    graph = state_equation(scene)
-    run = simulate(scene, scene.q, None, end, "dopri5", rtol=1e-6, t_eval=times)
+def _first_order(scene: dyn.Scene, end: float, times: Array | None) -> Inspection:
+    graph = dyn.state_equation(scene)
+    run = dyn.simulate(scene, scene.q, None, end, "dopri5", rtol=1e-6, t_eval=times)
     state = dict(zip(scene.coordinates, run.q.T, strict=True)) | dict(scene.parameters) | {"t": run.t}
     about = f"The rates of {len(scene.coordinates)} states: {len(graph.nodes)} nodes."
     at = {name: state[name] for name in graph.input_names}
@@ -155,21 +146,21 @@ def _first_order(scene: Scene, end: float, times: Array | None) -> Inspection:
     return Inspection(versions, Motion(run.t), at, stopped=stopped, units={"t": "s"})
 
 
-def _derived(system: System, *, momenta: bool) -> Graph:
+def _derived(system: dyn.System, *, momenta: bool) -> Graph:
     """The state that embedded formulations start from, q0_old .., qd0_old .. of q, qd, qdd and dt; and momenta."""
     dt, qdd = cg.variable("dt"), cg.variables([f"qdd{i}" for i in range(system.n)])
     old = {f"q{i}_old": q - dt * rate for i, (q, rate) in enumerate(zip(system.q, system.q_dot, strict=True))}
     old |= {f"qd{i}_old": qd - dt * rate for i, (qd, rate) in enumerate(zip(system.qd, qdd, strict=True))}
     inputs = [*system.q, *system.qd, *qdd, dt]
     if momenta:
-        graph = momentum(system)
+        graph = dyn.momentum(system)
         inputs += [node for node in graph.inputs if node not in inputs]
         old |= graph.outputs
     return Graph(inputs, old)
 
 
-def _version(scene: Scene, name: str) -> Version:
-    verdict = formulation_verdict(scene, name)
+def _version(scene: dyn.Scene, name: str) -> Version:
+    verdict = dyn.formulation_verdict(scene, name)
     about = f"{verdict.summary} {verdict.explanation}".strip()
     if not verdict.differs:
         alone = "these torques are those of the constraints alone"
@@ -191,12 +182,12 @@ def _named(**tables: Array) -> dict[str, float | Array]:
     return {f"{name}{i}": table[:, i] for name, table in tables.items() for i in range(table.shape[1])}
 
 
-def _shares(scene: Scene) -> StateTable | None:
+def _shares(scene: dyn.Scene) -> StateTable | None:
     """Shares of the torques of each partial Lagrangian, of damping and forces where there are any, and their sum."""
     system, mechanism = scene.system, scene.mechanism
     if len(system.partial_lagrangians) < 2 or (mechanism is not None and mechanism.base_parameters):
         return None
-    table, whole = torque_by_link(system), inverse_dynamics(system, "chain_rule")
+    table, whole = dyn.torque_by_link(system), dyn.inverse_dynamics(system, "chain_rule")
     rows = {f"tau{i}": [f"tau{i}_part{k}" for k in range(len(table.rows) + 1)] for i in range(system.n)}
     outputs = {part: table.graph.outputs[f"{tau}_{k}"] for tau, row in rows.items() for k, part in enumerate(row[:-1])}
     graph = Graph(whole.inputs, outputs | {row[-1]: whole.outputs[tau] for tau, row in rows.items()})
@@ -269,12 +260,12 @@ def _pivot(solved: Node, others: set[Node], place: Mapping[Node, int]) -> Node |
     return min(found, key=lambda node: (bool(node.args), place[node]), default=None)
 
 
-def carried(scene: Scene) -> Table | None:
+def carried(scene: dyn.Scene) -> Table | None:
     """The nodes that only the chain rule has, counted by part of the model and by what they are; None where none is.
 
     The classes are those of `cgraph compare`: the rates of slopes are what -dL/dq cancels in part.
     """
-    verdicts = [formulation_verdict(scene, name) for name in ("chain_rule", "newton_euler")]
+    verdicts = [dyn.formulation_verdict(scene, name) for name in ("chain_rule", "newton_euler")]
     left, right = (each.graph for each in verdicts)
     classes = cg.compare(left, right, classify=formulation_classes(verdicts)).classes("left")
     counts = {tuple(name.rpartition(": ")[::2]): count for name, count in classes.items()}

@@ -11,23 +11,18 @@ from dataclasses import replace
 import numpy as np
 
 import cgraph as cg
+import dynamics as dyn
 from cgraph import Graph, Node
 from cgraph._shared import write_files
 from dynamics import scenes
-from dynamics.equations.energies import kinetic_energy, potential_energy
-from dynamics.equations.equations_of_motion import gravity_force, momentum
-from dynamics.equations.formulations.formulations import momentum_rate
-from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
-from dynamics.equations.state_equation import state_equation, state_inputs
+from dynamics.equations.momentum.hamiltonian import velocities
+from dynamics.equations.state_equation import state_inputs
 from dynamics.integrators import TABLEAUS, derive, in_form
 from dynamics.integrators.rate_in_modes import switched
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.multibody.trees.joint_positions import contact_surfaces, drawn_points, view
-from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
-from dynamics.simulation.simulate import simulate
-from dynamics.simulation.trajectory import SimulationWarning
-from dynamics.systems.model import Model, display_names
+from dynamics.systems.model import Model
 
 from ..live_page.live_panel import Live, page_text, panel
 from ..pages.html import Page, Panel, html_target
@@ -94,14 +89,14 @@ def live(model: Model, path: str | os.PathLike[str] | None = None, *, start: Sta
     return text
 
 
-def live_panel(scene: Scene, *, momentum: bool = False) -> Panel:
+def live_panel(scene: dyn.Scene, *, momentum: bool = False) -> Panel:
     """The motion of a scene as a view of the inspector, computed from when its tab is first opened."""
     shown = panel(live_of(scene, momentum=momentum), begin='inspector.onView("live", startLive);')
     section = f'<section id="live" role="tabpanel" aria-label="live" hidden>\n{shown.body}</section>'
     return shown._replace(body="", end=section)
 
 
-def live_of(scene: Scene, *, momentum: bool = False) -> Live:
+def live_of(scene: dyn.Scene, *, momentum: bool = False) -> Live:
     """The panel's content for a scene. Masses and gravity of a small mechanism without parameters become parameters.
 
     momentum: the state is coordinates and momenta.  The step at first is one that is short enough.
@@ -111,7 +106,7 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
     scene = adjustable(scene)
     if scene.ode is not None:
         return _first_order(scene)
-    rate = hamilton_equations(scene.model) if momentum else state_equation(scene.model)
+    rate = dyn.hamilton_equations(scene.model) if momentum else dyn.state_equation(scene.model)
     known = state_inputs(scene.model)
     values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
     values |= _momenta(scene, values) if momentum else {}
@@ -130,11 +125,11 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
         usual = {f"qd{i}": USUAL.get(units.get(f"qd{i}", ""), 1.0) for i in range(scene.system.n)}
         reach = {name: abs(p) for name, p in _momenta(scene, values | usual).items()}
         scales |= {name: _round(p) for name, p in reach.items() if 0.0 < p < math.inf}  # of speeds that are none, NaN
-    names, limits = display_names(scene), _limits(scene)
+    names, limits = dyn.display_names(scene), _limits(scene)
     return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, names, units, NOTES, limits, radii)
 
 
-def adjustable(scene: Scene) -> Scene:
+def adjustable(scene: dyn.Scene) -> dyn.Scene:
     """The scene that the page computes: of a small mechanism without parameters, masses and gravity are some.
 
     Inertias are in proportion to the masses.
@@ -161,7 +156,7 @@ def adjustable(scene: Scene) -> Scene:
     return replace(scene, model=adjusted)
 
 
-def _limits(scene: Scene) -> dict[str, tuple[float, float]]:
+def _limits(scene: dyn.Scene) -> dict[str, tuple[float, float]]:
     """{input: where its slider ends}: the joints' limits of position, velocity and effort."""
     places = {name: k for k, name in enumerate(scene.velocities)}
     found = {f"q{k}": each.position for k, each in enumerate(scene.limits.values())}
@@ -171,9 +166,9 @@ def _limits(scene: Scene) -> dict[str, tuple[float, float]]:
     return found
 
 
-def _first_order(scene: Scene) -> Live:
+def _first_order(scene: dyn.Scene) -> Live:
     """The panel's content for a system of first order: its state over time, and its rates."""
-    rate = state_equation(scene)
+    rate = dyn.state_equation(scene)
     values = dict(zip(scene.coordinates, scene.q, strict=True)) | dict(scene.parameters)
     start = {name: float(values.get(name, 0.0)) for name in rate.input_names}  # the time is 0
     sides, of_sides = _sides(scene)
@@ -182,7 +177,7 @@ def _first_order(scene: Scene) -> Live:
     return Live(rate, start, shown, meters, dt=_step(scene), methods=TABLEAUS, units={"t": "s"}, notes=NOTES)
 
 
-def _sides(scene: Scene, form: str = "velocity") -> tuple[dict[str, Node], list[tuple[str, str, str]]]:
+def _sides(scene: dyn.Scene, form: str = "velocity") -> tuple[dict[str, Node], list[tuple[str, str, str]]]:
     """The sides of surfaces on which the rate jumps or kinks, and their meters."""
     switches = switched(in_form(derive(scene, {}), form)).switches
     if switches is None:
@@ -194,7 +189,7 @@ def _is_number(value: object) -> bool:
     return not isinstance(value, (Node, str))
 
 
-def _meters(scene: Scene, rate: Graph) -> tuple[dict[str, Node], list[tuple[str, str, str]]]:
+def _meters(scene: dyn.Scene, rate: Graph) -> tuple[dict[str, Node], list[tuple[str, str, str]]]:
     """Energies, momenta and torques over the inputs of the rate."""
     system = scene.system
     inputs = dict(zip(rate.input_names, rate.inputs, strict=True))
@@ -204,20 +199,20 @@ def _meters(scene: Scene, rate: Graph) -> tuple[dict[str, Node], list[tuple[str,
         inputs |= moved(**{name: inputs[name] for name in moved.input_names})
     else:
         inputs |= {f"qdd{i}": rate.outputs[f"qd{i}_dot"] for i in range(system.n)}
-    called, units = display_names(scene), {} if scene.mechanism is None else display_units(scene.mechanism.moving)
+    called, units = dyn.display_names(scene), {} if scene.mechanism is None else display_units(scene.mechanism.moving)
 
     def over(graph: Graph) -> dict[str, Node]:
         return graph(**{name: inputs[name] for name in graph.input_names})
 
-    (kinetic,) = over(kinetic_energy(system)).values()
-    (potential,) = over(potential_energy(system)).values()
+    (kinetic,) = over(dyn.kinetic_energy(system)).values()
+    (potential,) = over(dyn.potential_energy(system)).values()
     outputs = {"kinetic": kinetic, "potential": potential, "energy": kinetic + potential}
     meters = [(name, "J", "energy") for name in outputs]
     rates = {kind: {name: node for name, node in rate.outputs.items() if name[0] == kind} for kind in "qp"}
     groups = {
-        "velocity" if momenta else "momentum": rates["q"] if momenta else over(momentum(system)),
-        "torque": over(gravity_force(system)),
-        "rate": rates["p"] if momenta else over(momentum_rate(system)),
+        "velocity" if momenta else "momentum": rates["q"] if momenta else over(dyn.momentum(system)),
+        "torque": over(dyn.gravity_force(system)),
+        "rate": rates["p"] if momenta else over(dyn.momentum_rate(system)),
     }
     for group, nodes in groups.items():
         for name, node in nodes.items():
@@ -227,15 +222,15 @@ def _meters(scene: Scene, rate: Graph) -> tuple[dict[str, Node], list[tuple[str,
     return outputs, meters
 
 
-def _momenta(scene: Scene, values: Mapping[str, float]) -> dict[str, float]:
+def _momenta(scene: dyn.Scene, values: Mapping[str, float]) -> dict[str, float]:
     """p0.. at a state (q, qd)."""
-    graph = momentum(scene.system)
+    graph = dyn.momentum(scene.system)
     found = graph.evaluate({name: values.get(name, 0.0) for name in graph.input_names})
     return {name: float(value) for name, value in found.items()}
 
 
 def _places(
-    scene: Scene, rate: Graph, start: dict[str, float]
+    scene: dyn.Scene, rate: Graph, start: dict[str, float]
 ) -> tuple[dict[str, Node], tuple[int, ...], tuple[float, ...]]:
     """Places of joints and tips in the picture, x0, y0, x1, .. over the inputs of the state equation, and parents.
 
@@ -277,12 +272,12 @@ def _round(value: float) -> float:
     return next(each * power for each in (1.0, 2.0, 5.0, 10.0) if each * power >= value)
 
 
-def _step(scene: Scene) -> float:
+def _step(scene: dyn.Scene) -> float:
     """A step that is short enough: a share of those that an adaptive method takes at first, rounded."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SimulationWarning)  # the page shows what an equal step does to a stiff system
+        warnings.simplefilter("ignore", dyn.SimulationWarning)  # the page shows what equal steps do to a stiff system
         qd = None if scene.ode is not None else scene.qd
-        run = simulate(scene, scene.q, qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4, max_steps=MOST_STEPS)
+        run = dyn.simulate(scene, scene.q, qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4, max_steps=MOST_STEPS)
     steps = np.diff(run.t)
     usual = float(np.median(steps)) if run.stats.steps and steps.size else 1e-2 * scene.t_end
     return float(f"{_round(SHARE * usual) / 2.0:.3g}")

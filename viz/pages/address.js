@@ -20,3 +20,7 @@ function copyLink(told) {
   if (!navigator.clipboard) { told(false); return; }
   navigator.clipboard.writeText(location.href).then(() => told(true), () => told(false));
 }
+/** The same, told by the button for a while. */
+function copyByButton(button) {
+  copyLink((copied) => { button.textContent = copied ? "copied" : "it is in the address"; setTimeout(() => { button.textContent = "copy link"; }, 1500); });
+}

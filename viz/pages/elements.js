@@ -1,7 +1,7 @@
 // Elements of pages and of their pictures, and numbers as texts. Texts stay texts, whatever is in them.
 
 const SVG = "http://www.w3.org/2000/svg";
-function filled(made, attributes, inside) {
+function filled(made, attributes, inside = []) {
   for (const key in attributes) made.setAttribute(key, attributes[key]);
   made.append(...inside);
   return made;
@@ -11,7 +11,7 @@ const tag = (name, attributes = {}, ...inside) => filled(document.createElement(
 /** An element of a picture. */
 const drawn = (name, attributes = {}, ...inside) => filled(document.createElementNS(SVG, name), attributes, inside);
 /** An element of a picture, the last in another. */
-const element = (name, attributes, parent) => parent.appendChild(drawn(name, attributes));
+const element = (name, attributes, parent, ...inside) => parent.appendChild(drawn(name, attributes, ...inside));
 const byId = (id) => document.getElementById(id);
 
 /** A finite number in so many digits, of a very small or large one two less with its power of ten. */

@@ -3,7 +3,6 @@
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from functools import partial
 from html import escape
 
 from cgraph import Graph, variable
@@ -36,20 +35,13 @@ def equations(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
     return typeset([(variable(name), right) for name, right in zip(graph.outputs, rights, strict=True)], names, lines)
 
 
-def typeset(
-    given: Sequence[Sequence[Side]],
-    names: Mapping[str, str] | None = None,
-    lines: int = 12,
-    *,
-    digits: int = DIGITS,
-    rest: str = "",
-) -> str:
+def typeset(given: Sequence[Sequence[Side]], names: Mapping[str, str], lines: int, *, rest: str = "") -> str:
     """Statements that sides are equal, of nodes in reading form, as aligned equations; the last says what is left out.
 
     given: of each statement its sides from the left; a matrix, by rows, stands on the right.  rest: HTML behind the
     sentence on what is left out, such as the command that prints all.
     """
-    found = statements(given, notation(digits), names, lines, whole=True)
+    found = statements(given, NOTATION, names, lines, whole=True)
     rows = "".join(
         f"<mtr><mtd>{left}</mtd><mtd>{'<mo>=</mo>' if left else ''}</mtd><mtd>{right}</mtd></mtr>"
         for left, right in found.equations
@@ -62,9 +54,9 @@ def typeset(
     return f'{box}<math display="block">{table}</math></div>' * bool(rows) + more * bool(found.left_out)
 
 
-def inline(sides: Sequence[Side], names: Mapping[str, str] | None = None) -> str:
+def inline(sides: Sequence[Side], names: Mapping[str, str]) -> str:
     """A statement in a line of text, of nodes in reading form; one side alone is a formula."""
-    found = statements([(variable("left"), each) for each in sides], notation(), names)
+    found = statements([(variable("left"), each) for each in sides], NOTATION, names)
     return f"<math>{'<mo>=</mo>'.join([right for _, right in found.equations])}</math>"
 
 
@@ -82,13 +74,6 @@ def ranks(names: Iterable[str]) -> dict[str, int]:
         place = {"": 1, "dot": 3, "ddot": 4}[kind.accent] if kind else 0
         found[name] = {"p": 3, "tau": 5, "lambda": 5}.get(kind.word, place) if kind else 0
     return found
-
-
-def notation(digits: int = DIGITS) -> Notation:
-    """The notation of MathML, with numbers of so many digits."""
-    return Notation(
-        _names, partial(_number, digits), _operation, "<msub><mi>v</mi><mn>{}</mn></msub>".format, _matrix, "<mo>=</mo>"
-    )
 
 
 def _names(names: Iterable[str]) -> dict[str, str]:
@@ -116,7 +101,7 @@ def _letter(index: str) -> str:
     return GREEK.get(word, word) + theme.pretty(f"x{index[len(word) :]}")[1:] if word else index
 
 
-def _number(digits: int, value: float) -> tuple[str, int]:
+def _number(value: float, digits: int = DIGITS) -> tuple[str, int]:
     if (parts := fraction(value)) is not None:
         return f"<mfrac><mn>{parts[0]}</mn><mn>{parts[1]}</mn></mfrac>", PRODUCT
     text, _, power = f"{value:.{digits}g}".partition("e")
@@ -151,3 +136,6 @@ def _fenced(text: str) -> str:
 def _matrix(rows: Sequence[Sequence[str]]) -> str:
     inside = "".join(f"<mtr>{''.join(f'<mtd>{entry}</mtd>' for entry in row)}</mtr>" for row in rows)
     return f'<mtable class="matrix">{inside}</mtable>'
+
+
+NOTATION = Notation(_names, _number, _operation, "<msub><mi>v</mi><mn>{}</mn></msub>".format, _matrix, "<mo>=</mo>")

@@ -3,15 +3,11 @@
 import json
 import math
 import re
-from typing import Any
-from xml.etree import ElementTree
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Json
+from cgraph._shared import Json, formula_tree
 from cgraph.extend import OPS, Op
-
-FormulaPart = str | int | list[Any]  # of a formula: a text, the number of an argument, [element, attributes, *parts]
 
 
 def expression(module: str) -> str:
@@ -40,7 +36,7 @@ def operations() -> str:
         for op in OPS.values()
     }
     table = json.dumps(rows, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    formulas = [[op.name, [_tree(op), op.mathml.least, op.mathml.binding]] for op in OPS.values() if op.mathml]
+    formulas = [[op.name, [formula_tree(op), op.mathml.least, op.mathml.binding]] for op in OPS.values() if op.mathml]
     tree = json.dumps(formulas, separators=(",", ":"), ensure_ascii=False)
     return f"const VALUE = {{\n{functions},\n}};\nconst ROWS = {table};\nconst FORMULA = new Map({tree});\n"
 
@@ -60,31 +56,6 @@ def slopes(op: Op) -> dict[str, Json]:
             number[node] = op.arity + 1 + len(code)
             code.append(node.value if node.value is not None else [node.op.name, *[number[arg] for arg in node.args]])
     return {"code": code, "out": [number[node] for node in partials]}
-
-
-def _tree(op: Op) -> FormulaPart:
-    """The formula of an operation as a tree, so that the page makes elements and reads no markup."""
-    assert op.mathml is not None
-    try:
-        root = ElementTree.fromstring(f"<mrow>{op.mathml.text}</mrow>")  # noqa: S314 (the table's own text)
-    except ElementTree.ParseError as error:
-        raise ValueError(f"the MathML of operation {op.name!r} is not well formed: {error}") from None
-    return _element(root)
-
-
-def _element(element: ElementTree.Element) -> FormulaPart:
-    """[name, attributes, *what is inside]."""
-    parts = _parts(element.text)
-    for child in element:
-        parts += [_element(child), *_parts(child.tail)]
-    return [element.tag, element.attrib, *parts]
-
-
-def _parts(text: str | None) -> list[FormulaPart]:
-    """Text and the numbers of arguments, which stand as {0}, {1}, .. in it."""
-    return [
-        int(part[1:-1]) if re.fullmatch(r"{\d}", part) else part for part in re.split(r"({\d})", text or "") if part
-    ]
 
 
 def graph_data(graph: Graph) -> dict[str, Json]:

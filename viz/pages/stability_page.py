@@ -125,9 +125,7 @@ def shares(rows: Sequence[ReportData]) -> Figure:
             axis.plot(x, y, marker, color=color, markersize=4.5, clip_on=False)
         axis.set_yticks(range(len(names)), names, fontsize=8)
         axis.tick_params(axis="y", length=0)
-        axis.set_xlim(FROM, TO)
-        axis.set_ylim(len(names) - 0.5, -0.5)
-        axis.set_xlabel("figure over its bound")
+        axis.set(xlim=(FROM, TO), ylim=(len(names) - 0.5, -0.5), xlabel="figure over its bound")
     return figure
 
 

@@ -25,8 +25,7 @@ function surfaceView(svg, radii, count) {
       const [[x, y], ...ends] = points.slice(2 * radii.length + 3 * i), [u, v] = ends.map(([a, b]) => [a - x, b - y]);
       const area = u[0] * v[1] - u[1] * v[0], seen = Math.abs(area) > EDGE_ON;
       grid ||= seen;
-      plane.setAttribute("stroke-width", seen ? 1 : 2);
-      plane.setAttribute("stroke-opacity", seen ? 0.22 : 0.7);
+      filled(plane, { "stroke-width": seen ? 1 : 2, "stroke-opacity": seen ? 0.22 : 0.7 });
       const line = (a, b, way, far) => `M${x + a - far * way[0]} ${-(y + b - far * way[1])}L${x + a + far * way[0]} ${-(y + b + far * way[1])}`;
       const dx = cx - x, dy = cy - y;
       if (seen) { // lines around the place of the plane that is behind the middle of the picture

@@ -30,12 +30,8 @@ def work_precision(content: ReportData) -> Document:
 def _introduction(content: ReportData) -> list[Block]:
     times = content["times"]
     size = "natural size" if content["relative_to"] == "given" else "largest value"
-    before, after = content["load"]
-    busy = ""
-    if before is not None and after is not None:
-        busy = (
-            f"The load of the machine was {before:.1f} before and {after:.1f} after: above its cores, times are noisy."
-        )
+    noisy = "The load of the machine was {:.1f} before and {:.1f} after: above its cores, times are noisy."
+    busy = "" if None in content["load"] else noisy.format(*content["load"])
     stiff = "; stiff" if content["stiff"] else ""
     return [
         *left_out(content["left_out"]),
@@ -89,13 +85,8 @@ def _of_kind(content: ReportData) -> dict[str, list[ReportData]]:
 def _line(curve: ReportData, x: str, y: str) -> Line:
     """A curve's points in two of their columns, those without a number or far off left out."""
     shown = [(point[x], point[y]) for point in curve["points"] if point[x] and point[y] and _drawn(point)]
-    return Line(curve["name"], [a for a, _ in shown], [b for _, b in shown], *_look(curve["name"]))
-
-
-def _look(method: str) -> tuple[int, bool]:
-    """Color and dashes of a method, the same on every page."""
-    number = theme.METHODS.index(method)
-    return number, number >= len(COLORS)
+    color = theme.METHODS.index(curve["name"])  # the same on every page
+    return Line(curve["name"], [a for a, _ in shown], [b for _, b in shown], color, color >= len(COLORS))
 
 
 def _drawn(point: ReportData) -> bool:

@@ -14,9 +14,8 @@ from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_svg
 from ..pages.document import Block, Markup, Paragraph, Picture
 from ..pages.formulation_table import TITLES, WHY_FEWER, size_table
-from .fixed_layout import View, spoken, subscripts, view_of
 from .part import Part, drawn
-from .stage import Stage, stage_html
+from .stage import Stage, View, spoken, stage_html, subscripts, view_of
 from .typeset import row, terms, typeset
 
 SCENE = "spring_mass"
@@ -30,23 +29,11 @@ PAPER: Polynomial = {
 }
 
 
-def equation3(formulation: str) -> Polynomial:
-    """The terms of d/dt dL/dqd by that formulation, for L = I qd^2/2 - k q^2/2.
+def terms_of(graph: Graph, whole: Sequence[str] = ("qd0",)) -> Polynomial:
+    """The terms of the one output of a graph.
 
-    qd0 stands for the embedded velocity qdd0 dt + qd0_old.
+    whole: embedded ones that stand for themselves, qd0 for qdd0 dt + qd0_old, q0 for qd0 dt + q0_old.
     """
-    return _terms(momentum_rate(scenes.load(SCENE), formulation))
-
-
-def torque_terms(formulation: str, whole: Sequence[str] = ("qd0",)) -> Polynomial:
-    """The terms of the whole torque, d/dt dL/dqd - dL/dq, of that formulation.
-
-    whole: embedded ones that stand for themselves, q0 for qd0 dt + q0_old.
-    """
-    return _terms(inverse_dynamics(scenes.load(SCENE), formulation), whole)
-
-
-def _terms(graph: Graph, whole: Sequence[str] = ("qd0",)) -> Polynomial:
     return expand(
         graph.only_output(), {node: str(node.name) for node in graph.nodes if node.args and node.name in whole}
     )
@@ -54,14 +41,16 @@ def _terms(graph: Graph, whole: Sequence[str] = ("qd0",)) -> Polynomial:
 
 def equations() -> Part:
     """Equation (3), read off the graphs term by term."""
-    forms = {name: equation3(name) for name in FORMULATIONS}
+    scene = scenes.load(SCENE)
+    forms = {name: terms_of(momentum_rate(scene, name)) for name in FORMULATIONS}
     written = {name: format_polynomial(form) for name, form in forms.items()}
     same = forms["by_definition"] == PAPER
     lines = [f"{'paper, Eq. (3)':16} d/dt dL/dqd = {format_polynomial(PAPER)}"]
     lines += [f"{TITLES[name]:16} d/dt dL/dqd = {form}" for name, form in written.items()]
     lines.append(f"By definition, the graph has the paper's terms, all of them and no other: {'yes' if same else 'NO'}")
-    torques = {name: format_polynomial(torque_terms(name)) for name in FORMULATIONS}
-    sums = {name: torque_terms(name, ("q0", "qd0")) for name in FORMULATIONS}
+    graphs = {name: inverse_dynamics(scene, name) for name in FORMULATIONS}
+    torques = {name: format_polynomial(terms_of(graph)) for name, graph in graphs.items()}
+    sums = {name: terms_of(graph, ("q0", "qd0")) for name, graph in graphs.items()}
     lines += ["", "The torque is what Lagrange's equation asks for, tau = d/dt dL/dqd - dL/dq:"]
     lines += [f"{TITLES[name]:16} tau = {torque}" for name, torque in torques.items()]
     lines += [

@@ -18,16 +18,22 @@ from .embedding import embedding
 from .free_fall import figures4_and_5
 from .one_joint import equations, figures_1_to_3
 from .part import Part
+from .reconfiguration import figure10
 from .scaling import scaling_of_counts
 from .timing import figure6
 from .typeset import typeset
 
-# Arguments for a quick run: evaluations of each formulation, mechanisms beside those drawn, links of arms and chains.
-QUICK: dict[Callable[..., Part], object] = {
-    figure6: 100,
-    figure7: {},
-    embedding: (1, 3),
-    scaling_of_counts: (1, 3, 6, 10, 20),
+# {what a part is: (what makes it, its argument in a quick run if it has one)}: evaluations of each formulation,
+# mechanisms beside those drawn, links of arms and chains.
+PARTS: dict[str, tuple[Callable[..., Part], *tuple[object, ...]]] = {
+    "Equation (3), read off the graphs term by term": (equations,),
+    "Figures 1 to 3: by definition, kinetic only and by the chain rule, on one layout": (figures_1_to_3,),
+    "Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo": (figures4_and_5,),
+    "Figure 6 and Table 1: the time of one evaluation": (figure6, 100),
+    "Figure 7: both forms of the equations of motion, by depth": (figure7, {}),
+    "Figure 8: the law of the embedding, torque error against dt": (embedding, (1, 3)),
+    "Figure 9: nodes, edges and time over the number of links": (scaling_of_counts, (1, 3, 6, 10, 20)),
+    "Figure 10: the first torque after a change of structure": (figure10, (2, 3, 5)),
 }
 
 
@@ -46,24 +52,15 @@ def paper(
     check_can_draw()
     plot.check_can_plot()
     check_folder(folder)
-    makers: dict[str, Callable[..., Part]] = {
-        "Equation (3), read off the graphs term by term": equations,
-        "Figures 1 to 3: by definition, kinetic only and by the chain rule, on one layout": figures_1_to_3,
-        "Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo": figures4_and_5,
-        "Figure 6 and Table 1: the time of one evaluation": figure6,
-        "Figure 7: both forms of the equations of motion, by depth": figure7,
-        "Figure 8: the law of the embedding, torque error against dt": embedding,
-        "Figure 9: nodes, edges and time over the number of links": scaling_of_counts,
-    }
-    parts, files, total = [], dict[Path, str | bytes](), len(makers) + len(beside)
-    for number, (what, make) in enumerate(makers.items(), start=1):
+    parts, files, total = [], dict[Path, str | bytes](), len(PARTS) + len(beside)
+    for number, (what, (make, *few)) in enumerate(PARTS.items(), start=1):
         say(f"[{number}/{total}] {what} ...")
-        part = make(QUICK[make]) if quick and make in QUICK else make()
+        part = make(*few) if quick else make()
         made = part.files()
         files |= {folder / name: content for name, content in made.items()}
         say(f"[{number}/{total}] {', '.join(made)}: ready")
         parts.append(part)
-    for number, (name, (what, page)) in enumerate(beside.items(), start=len(makers) + 1):
+    for number, (name, (what, page)) in enumerate(beside.items(), start=len(PARTS) + 1):
         say(f"[{number}/{total}] {what} ...")
         files[folder / name] = page()
         say(f"[{number}/{total}] {name}: ready")
@@ -80,7 +77,7 @@ def page_of(parts: Sequence[Part], links: Mapping[str, str]) -> str:
     text = (
         "<p>A replication of T. Kusaka and T. Tanaka, “A Chain Rule-Based Generalized Framework for Efficient Dynamic Analysis of "
         "Complex Robotic Systems”, Robotics 2025, 14(9), 115, doi:10.3390/robotics14090115. Figures 1 to 6 and Table 1 are numbered as "
-        "in the paper, and sections are the paper's; Figures 7 to 9 are not in it. Words, drawings and measurements are ours.</p>"
+        "in the paper, and sections are the paper's; Figures 7 to 10 are not in it. Words, drawings and measurements are ours.</p>"
         f"<p>Lagrange's equation {torque} as a computational graph, in three ways: by definition, with the Euler relation "
         f"{typeset('θ = ω dt + θ_old')} in the graph (wrong); with the kinetic energy {typeset('K')} alone in the first term (right for "
         "one joint, not for three); and by the chain rule (right). Every number on this page was measured when it was made.</p>"
@@ -92,6 +89,6 @@ def page_of(parts: Sequence[Part], links: Mapping[str, str]) -> str:
     )
     sections = [Section(part.name, part.heading, part.blocks) for part in parts]
     document = Document("The chain rule keeps θ and ω apart", [Markup(text, "")], sections)
-    script = f'"use strict";\n{asset(html.__package__, "elements.js")}{asset(__package__, "stage.js", "fall.js")}'
+    script = f'"use strict";\n{asset(html.__package__, "elements.js")}{"".join([part.script for part in parts])}{asset(__package__, "stage.js", "fall.js", "modules.js")}'
     data = {name: each for part in parts for name, each in part.moves.items()}
     return to_html(document, asset(__package__, "article.css"), script, data)

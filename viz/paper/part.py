@@ -25,7 +25,7 @@ class Part(NamedTuple):
     """One part of the paper: its section of the page, and what no block stands for.
 
     data: {name in figures.json: figures as plain data}.  other: {name: content} of further files.  moves: {id of an
-    element: what the page's script reads there}, for figures that move.
+    element: what the page's script reads there}, for figures that move.  script: what comes before that script.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Part(NamedTuple):
     data: Mapping[str, Json]
     other: Mapping[str, str | bytes] = MappingProxyType({})
     moves: Mapping[str, Json] = MappingProxyType({})
+    script: str = ""
 
     def files(self) -> dict[str, str | bytes]:
         """{name: content} of the pictures and tables that have a file, and of the others."""

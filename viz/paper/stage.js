@@ -2,10 +2,8 @@
 
 /** The graphs of the element's data. */
 function showGraphs(stage) {
-  const boxes = [...document.querySelectorAll(".stage .box")];
-  const dt = byId("dt");
-  let view = Object.keys(stage.views)[0];
-  let place = null; // of the node that is told of
+  const boxes = [...document.querySelectorAll(".stage .box")], dt = byId("dt");
+  let [view] = Object.keys(stage.views), place = null; // of the node that is told of
 
   const shown = () => boxes.filter((box) => box.dataset.views.split(" ").includes(view));
   const told = (where) => stage.views[view].nodes[where];
@@ -37,46 +35,35 @@ function showGraphs(stage) {
       excess.textContent = wrong[k];
       excess.classList.toggle("wrong", wrong[k] !== "0");
     }
-    const nodes = shown();
+    const nodes = shown(), first = nodes.find((box) => box.dataset.place === place) ?? nodes[0];
     for (const box of boxes) {
       box.classList.toggle("pointed", box.dataset.place === place);
       box.removeAttribute("tabindex");
     }
-    const first = nodes.find((box) => box.dataset.place === place) ?? nodes[0];
     first.setAttribute("tabindex", "0"); // the graph is one stop of the tabulator
     for (const box of nodes) {
       const [formula, what, values] = told(box.dataset.place);
-      box.setAttribute("role", "img");
-      box.setAttribute("aria-label", `${formula}, ${what}, ${values[k]}`);
+      filled(box, { role: "img", "aria-label": `${formula}, ${what}, ${values[k]}` });
     }
     if (place === null) return;
     const [formula, what, values] = told(place);
     byId("told").replaceChildren(tag("b", {}, formula), ` = ${values[k]} `, tag("span", {}, what));
   }
 
-  function point(box) {
-    place = box.dataset.place;
-    fill();
-  }
-
   for (const radio of document.querySelectorAll('input[name="view"]')) {
-    radio.addEventListener("change", () => choose(radio.value));
+    radio.onchange = () => choose(radio.value);
     if (radio.checked) view = radio.value; // a browser may keep the choice of an earlier visit
   }
-  for (const box of boxes) {
-    for (const event of ["pointerenter", "click", "focus"]) box.addEventListener(event, () => point(box));
-  }
-  byId("graph").addEventListener("keydown", (event) => {
-    const by = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
-    const nodes = shown();
-    const at = nodes.indexOf(document.activeElement);
+  for (const box of boxes) box.onpointerenter = box.onclick = box.onfocus = () => { place = box.dataset.place; fill(); };
+  byId("graph").onkeydown = (event) => {
+    const by = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key], nodes = shown(), at = nodes.indexOf(document.activeElement);
     if (!by || at < 0) return;
     event.preventDefault();
     const next = nodes[(at + by + nodes.length) % nodes.length];
     next.setAttribute("tabindex", "0");
     next.focus();
-  });
-  dt.addEventListener("input", fill);
+  };
+  dt.oninput = fill;
   choose(view);
 }
 

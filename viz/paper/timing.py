@@ -14,7 +14,6 @@ from dynamics.experiments.timing import spent
 from ..pages.document import Block, Paragraph, Table
 from ..pages.formulation_table import COLORS, TITLES
 from ..plots import plot
-from .eager import eager_evaluations
 from .part import Part, plotted
 
 EVALUATIONS = 1000  # as in the paper
@@ -38,8 +37,7 @@ Times = Mapping[str, Mapping[str, Timing]]  # {way of evaluating: {formulation: 
 def table_1(evaluations: int = EVALUATIONS) -> tuple[dict[str, Counts], Times]:
     """The sizes of the three formulations, and their times at random states; they take turns, so that drift is shared.
 
-    Ways are "interpreted", "compiled" and, where torch is installed, "PyTorch eager", which builds its graph anew at
-    every evaluation.
+    Ways are "interpreted" and "compiled".
     """
     scene = scenes.load("triple_pendulum")
     graphs = {name: inverse_dynamics(scene, name) for name in PAPER_MS}
@@ -47,8 +45,6 @@ def table_1(evaluations: int = EVALUATIONS) -> tuple[dict[str, Counts], Times]:
         "interpreted": {name: _interpreted(graph) for name, graph in graphs.items()},
         "compiled": {name: cg.compile(graph, "python") for name, graph in graphs.items()},
     }
-    if eager := eager_evaluations(scene.system, PAPER_MS):
-        runs["PyTorch eager"] = eager
     rng = np.random.default_rng(0)
     states = {
         name: np.where([x == "dt" for x in graph.input_names], 1e-3, rng.normal(size=(evaluations, len(graph.inputs))))
@@ -94,8 +90,7 @@ def figure6(evaluations: int = EVALUATIONS) -> Part:
         plotted("fig6", plot.bars(ratios, COLORS, "time, chain rule = 1"), caption, alt),
         Table("Times of one evaluation", *_times(times), folded=True, file="table1-times"),
         Paragraph(
-            "Interpreted: node by node in Python. Compiled: one generated Python function. PyTorch eager, measured where torch "
-            "is installed, builds and differentiates its graph anew at every evaluation. "
+            "Interpreted: node by node in Python. Compiled: one generated Python function. "
             "Kinetic only has a few nodes more than by definition: it needs both ∂K/∂θ and ∂L/∂θ, where by definition needs "
             "∂L/∂θ alone."
         ),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph._shared import Array, install
+from cgraph._shared import Array, required
 
 from .. import theme
 
@@ -33,11 +33,9 @@ GRID: dict[str, Any] = {"color": "#808080", "alpha": 0.25, "linewidth": 0.6}  # 
 
 def empty_figure(width: float, height: float) -> Figure:
     """An empty figure, size in inches, drawn without a display. Raises ImportError naming the extra."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise ImportError(f"plots need matplotlib: {install('viz')}") from error
-    return Figure(figsize=(width, height), layout="constrained")
+    matplotlib = required("matplotlib.figure", "plots need matplotlib", "viz")
+    figure: Figure = matplotlib.Figure(figsize=(width, height), layout="constrained")
+    return figure
 
 
 def check_can_plot() -> None:

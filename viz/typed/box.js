@@ -4,14 +4,7 @@ const TYPED_PART = "text"; // of the page's address
 const TYPED_WAIT = 400; // ms after the last key
 
 /** The text in the page's address, or nothing. */
-function linkedText() {
-  const part = linkPart(TYPED_PART);
-  try {
-    return part === undefined ? null : decodeURIComponent(part);
-  } catch {
-    return part; // no such % is made by a page
-  }
-}
+const linkedText = () => { const part = linkPart(TYPED_PART); return part === undefined ? null : unescaped(part); };
 /** The record of a text, or what is wrong with it: one sentence. */
 function typedRecord(text, forward = false) {
   try {
@@ -53,11 +46,7 @@ function startTyped(inspector, text, shownFirst) {
     event.stopPropagation(); // the page's keys are letters here
   };
   byId("which").onchange = shown;
-  const words = (text) => { byId("link").textContent = text; };
-  byId("link").onclick = () => {
-    keepLink(box.value);
-    copyLink((copied) => { words(copied ? "copied" : "it is in the address"); setTimeout(() => words("copy link"), 1500); });
-  };
+  byId("link").onclick = () => { keepLink(box.value); copyByButton(byId("link")); };
   byId("back-to").onclick = () => {
     inspector.showRecord(before);
     byId("back-to").hidden = true;
@@ -80,8 +69,7 @@ function openingButton() {
   const button = tag("button", { type: "button", id: "opentyped", "aria-controls": "typed", title: "type your own Lagrangian" }, "type L");
   const open = (on) => {
     byId("typed").hidden = !on;
-    button.setAttribute("aria-expanded", on);
-    button.setAttribute("aria-pressed", on);
+    filled(button, { "aria-expanded": on, "aria-pressed": on });
     dispatchEvent(new Event("resize")); // the picture has other room
   };
   button.onclick = () => { open(byId("typed").hidden); if (!byId("typed").hidden) byId("text").focus(); };
@@ -157,7 +145,7 @@ function curves({ coordinates }, { t, q }) {
   coordinates.forEach((name, i) => {
     element("path", { class: `curve${i}`, d: `M${t.map((_, k) => place(k, i)).join("L")}` }, svg);
     element("path", { class: `curve${i}`, d: `M${5 + places[i][0]} ${11 + NAMED.line * places[i][1] - high}h14` }, svg);
-    element("text", { x: 23 + places[i][0], y: 15 + NAMED.line * places[i][1] - high }, svg).textContent = name;
+    element("text", { x: 23 + places[i][0], y: 15 + NAMED.line * places[i][1] - high }, svg, name);
   });
   return svg;
 }

@@ -18,8 +18,7 @@ const raised = digitsAmong("⁰¹²³⁴⁵⁶⁷⁸⁹"), lowered = digitsAmong
 class TextError extends Error {
   constructor(words, at, end = at + 1) {
     super(words);
-    this.at = at;
-    this.end = end;
+    Object.assign(this, { at, end });
   }
 }
 const quoted = (text) => `“${text.length > 40 ? `${text.slice(0, 39)}…` : text}”`;
@@ -74,19 +73,10 @@ const functionNames = () => [...Object.keys(ROWS).filter(isFunction), ...Object.
 
 /** Reads one text's tokens from left to right. */
 class Reader {
-  constructor(tokens) {
-    this.tokens = tokens;
-    this.next = 0;
-  }
-  get token() {
-    return this.tokens[this.next];
-  }
-  peek(offset) {
-    return this.tokens[Math.min(this.next + offset, this.tokens.length - 1)];
-  }
-  is(...texts) {
-    return this.token.kind === "sign" && texts.includes(this.token.text);
-  }
+  constructor(tokens) { Object.assign(this, { tokens, next: 0 }); }
+  get token() { return this.tokens[this.next]; }
+  peek(offset) { return this.tokens[Math.min(this.next + offset, this.tokens.length - 1)]; }
+  is(...texts) { return this.token.kind === "sign" && texts.includes(this.token.text); }
   take() {
     const { token } = this;
     if (this.next < this.tokens.length - 1) this.next++;

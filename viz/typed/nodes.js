@@ -57,9 +57,7 @@ function within(settings, body) {
 
 /** Builds nodes folded and shared: the same operation on the same arguments is made once, labels united. */
 class Builder {
-  constructor() {
-    this.made = new Map();
-  }
+  made = new Map();
   make(op, args, label, name = null) {
     if (args.every((arg) => arg.op === "constant")) {
       const value = VALUE[op](...args.map((arg) => arg.value));
@@ -141,9 +139,7 @@ function folded(nodes, build = new Builder(), replace = new Map()) {
 const edgeCount = (nodes) => nodes.reduce((sum, node) => sum + node.args.length, 0);
 
 /** A graph: inputs, and Map from names to outputs; `nodes` arguments first. */
-function graphOf(inputs, outputs) {
-  return { inputs, outputs, nodes: topological(outputs.values()) };
-}
+const graphOf = (inputs, outputs) => ({ inputs, outputs, nodes: topological(outputs.values()) });
 
 /** The same function in fewer nodes, or the graph itself where folding makes none fewer. */
 function simplified(graph) {

@@ -7,23 +7,9 @@ from string import Template
 
 from .. import theme
 from ..inspector.page import compose
-from ..pages import html
 from ..pages.html import Page, Panel, asset
-from ..pages.operations import operations
 
-FILES = (
-    "expressions.js",
-    "statements.js",
-    "system.js",
-    "nodes.js",
-    "folding.js",
-    "derivatives.js",
-    "equations.js",
-    "verdict.js",
-    "motion.js",
-    "record.js",
-    "interface.js",
-)
+FILES = "expressions statements system nodes folding derivatives equations verdict motion record interface".split()
 
 
 def engine() -> str:
@@ -32,12 +18,8 @@ def engine() -> str:
     It needs the constants of `operations` and graph.js, and makes one, TYPED.
     """
     letters = json.dumps(theme.LETTERS, separators=(",", ":"), ensure_ascii=False)
-    return f"const TYPED = (() => {{\nconst LETTERS = {letters};\n{asset(__package__, *FILES)}\n}})();\n"
-
-
-def script() -> str:
-    """The engine with what it needs, for a program that has no page."""
-    return f'"use strict";\n{operations()}{asset(html.__package__, "graph.js", "slopes.js")}{engine()}'
+    scripts = asset(__package__, *[f"{name}.js" for name in FILES])
+    return f"const TYPED = (() => {{\nconst LETTERS = {letters};\n{scripts}\n}})();\n"
 
 
 def typed_page(text: str | None = None) -> Page:

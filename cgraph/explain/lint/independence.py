@@ -9,11 +9,12 @@ from ...core.forward import tangents
 from ...core.graph import Edge, Graph
 from ...core.label import ADJOINT
 from ...core.node import Node, constant
+from ...core.traversal import descendants
 from ...util.words import counted
 from ...writing.networkx_queries import minimum_cut
 from ...writing.source_lines import lines_text
 from ..names import Name, Names, joined
-from ..paths import ancestors, best_paths, between, descendants
+from ..paths import ancestors, best_paths, between, edges_among
 from .finding import Finding
 
 Group = Name | Sequence[Name]
@@ -59,13 +60,7 @@ def _proof(names: Names, dependent: list[Node], on: list[Node]) -> str:
 def _blame(names: Names, inside: list[Node], dependent: list[Node], on: list[Node], function: str) -> Finding:
     """The finding for `dependent`, which depends on `on` through the nodes `inside`: a minimum cut of the paths."""
     allowed, sources, sinks = set(inside), set(on), set(dependent)
-    edges = [
-        Edge(arg, node, slot)
-        for node in inside
-        if node not in sources
-        for slot, arg in enumerate(node.args)
-        if arg in allowed and arg not in sinks
-    ]
+    edges = [edge for edge in edges_among(inside) if edge.target not in sources and edge.source not in sinks]
     starts, ends = [node for node in on if node in allowed], [node for node in dependent if node in allowed]
     cut = minimum_cut(edges, starts, ends)
     paths = _paths_through(cut, inside, edges, starts, ends)

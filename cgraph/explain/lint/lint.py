@@ -14,13 +14,11 @@ from ...operations.table import FLAT
 from ...util.json_type import Json
 from ...util.require import require_graph, require_kind, require_mapping, require_sequence
 from ...util.words import counted
-from ..edge_partials import Point
-from ..names import Name, Names, joined
+from ..names import Name, Names, Point, joined
 from ..paths import ancestors
-from .cancellation import cancellations, rounded
+from .cancellation import Box, Rounded, cancellations, rounded, singular_nodes
 from .finding import Finding
 from .independence import Group, check_independence
-from .singular import Box, singular_nodes
 
 Pair = tuple[Group, Group]
 
@@ -160,21 +158,18 @@ def lint(
         violations, held = check_independence(known, first, second, function)
         findings += violations
         proofs += held
+    checks: list[tuple[list[Finding], str]] = []  # and what holds where there is no finding
     if depends is not None and require_mapping("depends", depends, "output: names"):
-        missing = _missing_dependences(known, depends)
-        findings += missing
-        if not missing:
-            proofs.append("every output depends on what was declared for it.")
+        checks.append((_missing_dependences(known, depends), "every output depends on what was declared for it."))
     if box is not None:
-        singular = singular_nodes(known, box)
-        findings += singular
-        if not singular:
-            proofs.append(f"no slope is unbounded in the box, of {counted(len(known.number), 'operation')}.")
+        proof = f"no slope is unbounded in the box, of {counted(len(known.number), 'operation')}."
+        checks.append((singular_nodes(known, box), proof))
     if at is not None:
-        losses = cancellations(known, at, digits)
-        findings += losses
-        if not losses:
-            proofs.append(_accuracy(known, at, digits))
+        errors = rounded(known, at)
+        checks.append((cancellations(known, errors, digits), _accuracy(graph, errors, digits)))
+    for found, proof in checks:
+        findings += found
+        proofs += [] if found else [proof]
     return Lint(graph, tuple(findings), tuple(_unused_inputs(known)), tuple(proofs))
 
 
@@ -186,14 +181,13 @@ def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
     if isinstance(independent, (str, Node)):
         raise TypeError(f"independent: expected pairs of groups, got {independent!r:.60}")
     pairs = list(require_sequence("independent", independent, "pairs of groups"))
-    if len(pairs) == 2 and isinstance(independent, tuple):
-        if all([isinstance(each, tuple) and len(each) == 2 for each in pairs]):
+    named = all([isinstance(group, (str, Node)) for group in pairs])
+    if len(pairs) == 2 and (named or isinstance(independent, tuple)):
+        if isinstance(independent, tuple) and all([isinstance(each, tuple) and len(each) == 2 for each in pairs]):
             raise ValueError(
                 f"independent: {independent!r:.60} may be one pair of groups or two pairs; give groups as strings or "
                 "lists, and several pairs in a list"
             )
-        return [(pairs[0], pairs[1])]
-    if len(pairs) == 2 and all([isinstance(group, (str, Node)) for group in pairs]):
         return [(pairs[0], pairs[1])]
     for pair in pairs:
         if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
@@ -235,10 +229,10 @@ def _is_signed(node: Node) -> bool:
 def _unused_inputs(names: Names) -> list[Finding]:
     """The inputs that no output depends on."""
     used = set(names.graph.nodes)
-    unused = {node: names.text(node) for node in names.graph.inputs if node not in used}
+    unused = [(names.text(node), node) for node in names.graph.inputs if node not in used]
     return [
         Finding("unused input", f"Nothing uses the input {name}.", (node,), data={"input": name})
-        for node, name in unused.items()
+        for name, node in unused
     ]
 
 
@@ -258,9 +252,8 @@ def _missing_dependences(names: Names, depends: Mapping[Name, Name | Sequence[Na
     return findings
 
 
-def _accuracy(names: Names, at: Point, digits: float) -> str:
-    errors = rounded(names, at)
-    certain = {name: errors.digits(node) for name, node in names.graph.outputs.items()}
+def _accuracy(graph: Graph, errors: Rounded, digits: float) -> str:
+    certain = {name: errors.digits(node) for name, node in graph.outputs.items()}
     name = min(certain, key=lambda output: certain[output])
     least = certain[name]
     rest = f"; rounding leaves {name} {least:.0f} digits, no output less" if math.isfinite(least) else ""

@@ -143,7 +143,8 @@ class Passes(Registers):
     of: registers whose values after a pass matter.  wrt: those by which derivatives are taken,
     besides what a pass hands on: `inputs`, which stay the same, and `varied`, of the feed.  constant: those whose
     values have no derivatives.  plain: the assignments.  constants: registers that passes read and never write.
-    handed: {register that a pass hands on to the next: the one that has its value after the pass}.
+    handed: {register that a pass hands on to the next: the one that has its value after the pass}.  shared: as of the
+    program, without those of `wrt`.
     """
 
     def __init__(self, program: Program, of: Sequence[str], wrt: Sequence[str], constant: Sequence[str] = ()) -> None:
@@ -168,7 +169,9 @@ class Passes(Registers):
         reads = [name for name in effects(statements_of(self.plain))[0] if name in program.registers]
         handed = [name for name in dict.fromkeys((*of, *reads)) if name in self.current and name not in self.fed]
         self.handed = {name: self.now(name) for name in handed}
-        self.constants = [name for name in reads if name not in self.handed and name not in self.fed]
+        self.shared = {name: numbers for name, numbers in program.shared.items() if name not in wrt}
+        known = {*self.handed, *self.fed, *self.shared}
+        self.constants = [name for name in reads if name not in known]
         self.inputs = [name for name in dict.fromkeys(wrt) if name not in self.fed and name not in self.handed]
         self.varied = [name for name in dict.fromkeys(wrt) if name in self.fed]
         moving = {*self.inputs, *self.varied, *[name for name in handed if name not in constant]}
@@ -189,8 +192,8 @@ class Passes(Registers):
         if row.bodies:
             return rule_of(statement, "assign")(statement, self)  # type: ignore[no-any-return]
         before = {name: self.now(name) for name in names_in(statement, row.reads)}
-        new = with_names(statement, [each for each in row.reads if each not in row.writes], self.now)
-        new = with_names(new, row.writes, self.write)
+        new = with_names(statement, self.now, [each for each in row.reads if each not in row.writes])
+        new = with_names(new, self.write, row.writes)
         changed = names_in(statement, [each for each in row.writes if each in row.reads])
         return Assignment(new, tuple([copied(before[name], self.now(name)) for name in changed]))
 
@@ -211,7 +214,8 @@ class Passes(Registers):
         names = {name for statement in body for names in reads_and_writes(statement) for name in names}
         used = {*names, *record, *feed, *more, self.unsolved}
         lengths = {name: length for name, length in {**made.lengths, self.unsolved: 1}.items() if name in used}
-        return Program(lengths, body, record=record, feed=feed)
+        shared = {name: numbers for name, numbers in self.shared.items() if name in lengths}
+        return Program(lengths, body, record=record, feed=feed, shared=shared)
 
 
 def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence[str] = ()) -> Linearized:

@@ -8,10 +8,11 @@ from ...core.graph import Graph
 from ...core.node import constant
 from ...operations.table import maximum, where
 from ...writing.naming import variables
-from ..statement import Names, Statement, bodies_of, effects, reads_and_writes, row_of, with_names
+from ..statement import Names, Statement, bodies_of, effects, reads_and_writes, with_names
 from ..statements.call import Call, Map, Sum, added, copied, elements, sizes
 from ..statements.control import FixedPoint, If, While
 from ..statements.matrix import Solve
+from ..statements.rows import Ends, For, Kind, for_rows, sizes_of
 from .jvp import Assignment, Numbers, Passes, Registers, Tangent, split, statements_of, tangent_graph
 from .transpose import Adjoint, cotangent_graph
 
@@ -221,9 +222,7 @@ def assign_fixed_point(statement: FixedPoint, passes: Passes) -> Assignment:
     passes.current = outside
     carried = [name for name in dict.fromkeys((*first, statement.register)) if name in at]
     copies = tuple([copied(before.get(name, name), at[name]) for name in carried])
-    rows = [(each, row_of(each)) for each in statement.body]
-    body = tuple([with_names(each, dict.fromkeys((*row.reads, *row.writes)), passes.now) for each, row in rows])
-    loop = FixedPoint(passes.now(statement.register), body)
+    loop = FixedPoint(passes.now(statement.register), tuple([with_names(each, passes.now) for each in statement.body]))
     return Assignment(loop, copies, (turn,), (after,), tuple([at[name] for name in carried]))
 
 
@@ -272,6 +271,78 @@ def _add_settled(
     state = (old, turns, stalled, registers.unsolved)
     body.append(Call(_JUDGED, (total, *state), (going, *state)))
     registers.add(Call(_BEGUN, (), (going, turns, stalled, old)), While(going, tuple(body)), *turn)
+
+
+def _kinds(assignment: Assignment) -> tuple[list[Kind], dict[str, str]]:
+    """The kinds of rows, and {register that rows change: the one before}, which a row reads that writes there."""
+    kinds, before = [], dict(zip(assignment.statement.changed, assignment.sources, strict=True))
+    for graph, reads, writes, adds in assignment.statement.kinds:
+        own = {end[:2] for end in writes}
+        old = [(before[end[0]], *end[1:]) if end[:2] in own else end for end in reads]
+        kinds.append((graph, old, writes, adds))
+    return kinds, before
+
+
+def _renamed(ends: Ends, names: Mapping[str, str]) -> Ends:
+    return [(names[name], table, length) for name, table, length in ends]
+
+
+def _rows(statement: For, kinds: Sequence[Kind], changed: Sequence[str]) -> For:
+    """The statement with other kinds of rows, which read what their graphs use."""
+    made: list[Kind] = []
+    for graph, reads, writes, adds in kinds:
+        used = {*graph.outputs.values(), *[arg for node in graph.nodes for arg in node.args]}
+        groups = zip(split(graph.inputs, sizes_of(reads)), reads, strict=True)
+        kept = [(nodes, end) for nodes, end in groups if not used.isdisjoint(nodes)]
+        graph = Graph([node for nodes, _ in kept for node in nodes], graph.outputs)
+        made.append((graph, [end for _, end in kept], writes, adds))
+    return for_rows(made, (statement.kind, statement.count), changed, backwards=statement.backwards)
+
+
+def push_for(assignment: Assignment, tangent: Tangent) -> None:
+    """Each row pushes the tangents of what it reads on to those of what it writes and adds."""
+    kinds, before = _kinds(assignment)
+    if tangent.active.isdisjoint(before):
+        return
+    dots = {name: tangent.fresh(f"{name}_dot", tangent.lengths[name]) for name in before}
+    tangent.add(*[copied(tangent.dots.get(before[name]), dot) for name, dot in dots.items()])
+    tangent.dots |= {name: dot for name, dot in dots.items() if name in tangent.active}
+    rows: list[Kind] = []
+    for graph, reads, writes, adds in kinds:
+        moving = tuple([k for k, end in enumerate(reads) if end[0] in tangent.dots])
+        made = tangent_graph(graph, sizes_of(reads), moving, (len(graph.outputs),))[0] if moving else None
+        made = made or Graph([], dict.fromkeys(graph.outputs, 0.0))
+        along = [*reads, *_renamed([reads[k] for k in moving], tangent.dots)]
+        rows.append((made, along, _renamed(writes, dots), _renamed(adds, dots)))
+    tangent.add(_rows(assignment.statement, rows, [*dots.values()]))
+
+
+def pull_for(assignment: Assignment, adjoint: Adjoint) -> None:
+    """Each row, the last first, adds to cotangents of what it reads; what was written over has had no influence."""
+    statement, (kinds, before) = assignment.statement, _kinds(assignment)
+    if adjoint.bars.keys().isdisjoint(before):
+        return
+    bars = {name: adjoint.bar(name) for name in before}
+    old = {name: adjoint.bar(name) for name in before if any(name == end[0] for kind in kinds for end in kind[2])}
+    idle = adjoint.fresh("idle", 1)
+    nothing: Kind = (Graph([], {"zero": 0.0}), [], [], [(idle, "", 1)])  # of a row without a result
+    rows, overwritten = list[Kind](), list[Kind]()
+    for graph, reads, writes, adds in kinds:
+        ends, zeros = [*writes, *adds], {f"{k}": 0.0 for k in range(sum(sizes_of(writes)))}
+        wanted = tuple([k for k, (name, *_) in enumerate(reads) if name in adjoint.active])
+        sizes, seeded = (sizes_of(reads), sizes_of(ends)), tuple(range(len(ends)))
+        pulled, kept = cotangent_graph(graph, None, sizes[0], wanted, sizes[1], seeded) if wanted else (None, ())
+        bars |= {name: adjoint.bar(name) for name in dict.fromkeys([reads[k][0] for k in kept]) if name not in bars}
+        results = _renamed([reads[k] for k in kept], bars)
+        rows.append((pulled, [*reads, *_renamed(ends, bars)], [], results) if pulled else nothing)
+        overwritten.append((Graph([], zeros), [], _renamed(writes, old), []) if zeros else nothing)
+    adjoint.add(*[copied(adjoint.bars.get(name) if name in before else None, bar) for name, bar in bars.items()])
+    adjoint.add(replace(_rows(statement, rows, [*bars.values(), idle]), backwards=not statement.backwards))
+    adjoint.add(*[copied(bars[name], bar) for name, bar in old.items()])
+    adjoint.add(*([_rows(statement, overwritten, [*old.values(), idle])] if old else []))
+    for name, bar in (bars | old).items():
+        if (source := before.get(name, name)) in adjoint.active:
+            adjoint.collect(source, bar)
 
 
 _A, _B = variables("a b")

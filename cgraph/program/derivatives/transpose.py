@@ -21,8 +21,9 @@ from ...util.require import require_mapping, require_whole
 from ..program import Program
 from ..runners.native_runner import runner
 from ..runners.runner import Runner
-from ..statement import Lengths, Statement, effects, length_of, needed, reads_and_writes, row_of
+from ..statement import Lengths, Statement, effects, graphs_of, length_of, needed, reads_and_writes, row_of
 from ..statements.call import Call, added, copied
+from ..statements.rows import For
 from .jvp import Assignment, Linearized, Numbers, Passes, Product, Registers, nonzero, rule_of, split, statements_of
 
 HEAVY_GRAPH = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
@@ -98,8 +99,10 @@ def _recovery(assignments: Sequence[Assignment], values: Iterable[str]) -> tuple
 
 
 def _is_heavy(statement: Statement) -> bool:
-    if isinstance(statement, Call):
-        return sum([1 for node in statement.graph.nodes if node.args]) > HEAVY_GRAPH * len(statement.graph.outputs)
+    if isinstance(statement, Call | For):
+        graphs = graphs_of(statement)
+        size = sum([1 for graph in graphs for node in graph.nodes if node.args])
+        return size > HEAVY_GRAPH * sum([len(graph.outputs) for graph in graphs])
     return bool(row_of(statement).bodies)
 
 
@@ -267,7 +270,8 @@ def _pulled(
     rows = rows if feed is None else real_array("feed", feed)
     if rows.ndim != 2 or len(rows) != passes:
         raise GraphError(f"the feed needs a row for each of {passes} passes, got shape {rows.shape}")
-    own = {name: length for name, length in lengths.items() if along.passes.own not in name}
+    shared = along.forward.program.shared
+    own = {name: n for name, n in lengths.items() if along.passes.own not in name and name not in shared}
     start, after = _numbers("values", values, own), _numbers("seeds", seeds, {name: own[name] for name in of})
     tape = Tape(along, start, lambda first, last: rows[first:last, :, None])
     tape.run(0, passes)

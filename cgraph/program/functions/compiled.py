@@ -8,21 +8,20 @@ import pickle
 import warnings
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...codegen.bound_call import CEntry, bound, c_entry
-from ...codegen.disk_cache import cache_folder
+from ...codegen.disk_cache import cache_choice, cache_folder
 from ...codegen.llvm_engine import MissingFunctionError
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
 from ...core.graph import Graph
 from ...core.html_text import html_table, html_text
 from ...core.node import Node
-from ...util.extras import scipy_module
+from ...util.extras import required
 from ...util.memory import lies_in_rows, require_memory, require_out, require_target
 from ...util.require import require_choice, require_flag, require_graph
 from ...util.threads import thread_count, write_batch
@@ -351,7 +350,8 @@ class Compiled(BoundFunction):
         count = thread_count(threads)
         if not require_flag("sparse", sparse):
             return matrix.at(points, True, count)
-        module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
+        module = required("scipy.sparse", "a sparse derivative needs SciPy", "scipy")
+        columns, starts = matrix.compressed
         rows = matrix.at(points, False, count)
         listed = rows if rows.ndim == 2 else [rows]
         found = [module.csr_array((row, columns.copy(), starts.copy()), shape=matrix.entries.shape) for row in listed]
@@ -434,12 +434,7 @@ def compile(
     require_choice("backend", backend, BACKENDS)
     require_graph("compile", graph)
     fast, fma = require_flag("fast", fast), require_flag("fma", fma)
-    if isinstance(cache, (bool, np.bool_)):
-        kept: bool | str = bool(cache)
-    elif isinstance(cache, (str, os.PathLike)) and os.fspath(cache):
-        kept = str(Path(cache).expanduser().absolute())  # holds in another folder and another process
-    else:
-        raise TypeError(f"cache must be True, False or the path of a folder, got {cache!r:.60}")
+    kept = cache_choice(cache)
     options = {"fast": fast, "fma": fma, "cache": kept}
     large = backend == "auto" and len(graph.nodes) > LARGE_GRAPH
     if large:

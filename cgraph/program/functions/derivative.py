@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...autodiff.coloring import NONE, jacobian_coloring, star_coloring
-from ...autodiff.direction_split import DirectionSplit, direction_split
-from ...autodiff.products import forward_products, reverse_products
+from ...autodiff.products import DirectionSplit, direction_split, forward_products, reverse_products
 from ...autodiff.sparsity import Indices, Indices32, Pattern, entry_graph, full, pattern, symmetric, written_sizes
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
@@ -216,6 +215,7 @@ class ColoredMatrix:
         self.entries, self._source, self._size = entries, source, size
         self._parts = () if isinstance(source, Graph) else source
         self._lanes, self._ready, self._full = lanes, ready, full(entries)
+        self._directions = sum([part.directions(1) for part in self._parts])
         self._checks = [f"check{k}" for k, part in enumerate(self._parts) if part.derivative.guarded is not None]
         self._functions = [BoundFunction(self.bind, size, shape) for shape in (entries.rows.shape, entries.shape)]
 
@@ -259,10 +259,6 @@ class ColoredMatrix:
         write_batch(max(width // LEAST_BLOCK, 1) * LEAST_BLOCK, columns, points.T, rows.T, threads)
         if self._checks:
             _mend(values, lambda at, found: self._careful.write(points[at], found, threads))
-
-    @cached_property
-    def _directions(self) -> int:
-        return sum([part.directions(1) for part in self._parts])
 
     @cached_property
     def _careful(self) -> ColoredMatrix:

@@ -10,22 +10,24 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...codegen.arithmetic import Arithmetic, bits
 from ...codegen.batch_ir import Batch, Place, batch_ir, rows_ir
-from ...codegen.function_writer import FunctionWriter
+from ...codegen.function_writer import Arithmetic, FunctionWriter, bits
 from ...codegen.llvm_engine import Code
 from ...core.evaluation import Array
 from ...util.memory import aligned, lies_in_rows
 from ..fuse import fused
 from ..many import many_keeping
 from ..program import Program, whole_graph
-from ..writer import offsets
+from ..writer import layout
 
-ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0)"  # a pass without a record
+# A pass without a record.
+ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0, ptr {shared})"
 Source = Callable[[Program, Arithmetic], str]  # writes the module with `run`
 Compiling = Callable[[str, int], Code]  # compiles a text in vectors of so many lanes
 Counts = np.ndarray[Any, np.dtype[np.int64]]
+Begin = Mapping[int, ArrayLike]  # {a vector of a memory: numbers from there on}
 _LANES = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 6, *[ctypes.c_int64] * 3)
 _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
 
@@ -33,13 +35,15 @@ _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int
 class BatchCode:
     """The function of batches of a module; any number of threads may call it at once.
 
-    start: {a vector of the memory: numbers from there on}, else 0.  columns: whether points may be in columns, too.
+    start: {a vector of the memory: numbers from there on}, else 0.  shared: the same, numbers that may change between
+    calls.  columns: whether points may be in columns, too.
     """
 
-    def __init__(self, code: Code, lanes: int, text: Batch, start: Mapping[int, Array], *, columns: bool) -> None:
+    def __init__(self, code: Code, lanes: int, text: Batch, start: Begin, shared: Begin, *, columns: bool) -> None:
         self._rows = code.function("rows", _BATCH)
         self._columns = code.function("batch", _BATCH) if columns else None
         self.source, self._size, self._lanes, self._start = text.source, text.size, lanes, start
+        self._shared = shared
         self._free: list[Array] = []  # memories
 
     def __call__(self, points: Array, result: Array) -> None:
@@ -69,23 +73,29 @@ class BatchCode:
         except IndexError:
             memory = aligned(self._size)
             memory[:] = 0.0
-            for at, numbers in self._start.items():
-                memory[at * self._lanes : (at + len(numbers)) * self._lanes] = np.repeat(numbers, self._lanes)
+            _fill(memory, self._start, self._lanes)
+        _fill(memory, self._shared, self._lanes)
         entry = self._rows if axis else self._columns
         strides = points.strides[axis] // points.itemsize, result.strides[axis] // result.itemsize
         entry(points.ctypes.data, result.ctypes.data, count, *strides, memory.ctypes.data)  # type: ignore[misc]
         self._free.append(memory)
 
 
+def _fill(memory: Array, numbers: Begin, lanes: int) -> None:
+    """Put numbers into all lanes of a memory."""
+    for at, values in numbers.items():
+        memory[at * lanes : (at + np.size(values)) * lanes] = np.repeat(values, lanes)
+
+
 def pass_ir(program: Program, name: str, arithmetic: Arithmetic, source: Source) -> Batch:
     """The module with `rows`, see `codegen.batch_ir`, of one pass, from the register of that name to its record."""
     if (graph := whole_graph(program, name)) is not None:
         return batch_ir(graph, arithmetic.lanes, arithmetic.flags, arithmetic.registers)
-    places = offsets(program.registers, 1)
+    places, size = layout(program.registers, program.shared, 1)
     point, *results = [Place(places[each], program.registers[each]) for each in (name, *program.record)]
 
     def compute(ir: FunctionWriter, *_: str) -> None:
-        ir.line(ONE_RUN.format(done=ir.room(1, "i64")))
+        ir.line(ONE_RUN.format(done=ir.room(1, "i64"), shared=ir.at("%w", size)))
 
     driver = rows_ir(Arithmetic(arithmetic.flags, arithmetic.lanes), point, results, compute)
     text = source(replace(program, record=()), arithmetic)
@@ -103,7 +113,8 @@ class LaneCode:
     ) -> None:
         """program: its first registers are those `kept` between passes.  clock: a register, see `__call__`."""
         program = fused(many_keeping(program, kept), alike=how.alike)
-        places = offsets(program.registers, 1)
+        places, _ = layout(program.registers, program.shared, 1)
+        self._shared, self._lanes = {places[name]: numbers for name, numbers in program.shared.items()}, how.lanes
         self.numbers = {name: slice(places[name], places[name] + program.registers[name]) for name in kept}
         self.size, self.width = sum([program.registers[name] for name in kept]), program.width
         self._memory = how.lanes * places[""]
@@ -120,6 +131,7 @@ class LaneCode:
         """
         memory = aligned(self._memory)
         memory[:] = 0.0
+        _fill(memory, self._shared, self._lanes)
         arrays = (memory, memories, which, passes, rows, np.append(marks, math.nan))
         self._entry(*[array.ctypes.data for array in arrays], len(which), most, len(marks))
 
@@ -130,7 +142,7 @@ class _LaneWriter(FunctionWriter):
     def __init__(self, program: Program, kept: int, clock: str, arithmetic: Arithmetic) -> None:
         super().__init__(arithmetic)
         self._program, self._kept, self._clock = program, kept, clock
-        self._places = offsets(program.registers, 1)
+        self._places, self._size = layout(program.registers, program.shared, 1)
         self._integers = f"<{self.lanes} x i64>"
         # Of each lane: its memory, or -1; the passes that are left to it; the next mark of its clock. Memories taken.
         self._holds, self._left, self._due = self.room(1, self._integers), self.room(1, self._integers), self.room()
@@ -153,7 +165,7 @@ class _LaneWriter(FunctionWriter):
                 self._take(lane)
             holds = self.load_at(self._holds, self._integers)
             self.leave_unless(self.some(self.value(f"icmp sge {self._integers} {holds}, zeroinitializer")), end)
-            self.line(ONE_RUN.format(done=done))
+            self.line(ONE_RUN.format(done=done, shared=self.at("%w", self._size)))
             self._record_lanes()
             left = self.value(f"sub {self._integers} {self.load_at(self._left, self._integers)}, splat (i64 1)")
             self.store_at(left, self._left, self._integers)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...codegen import llvm_engine as llvm
-from ...codegen.arithmetic import Arithmetic
 from ...codegen.bound_call import LONG, SHORT, bound_call
-from ...codegen.function_writer import copied_bytes
+from ...codegen.disk_cache import cache_choice, cache_folder
+from ...codegen.function_writer import Arithmetic
 from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
 from ...core.evaluation import Array
 from ...core.scope import without_collection
@@ -28,8 +28,8 @@ from ..fuse import fused
 from ..program import Program, outliving, whole_graph
 from ..statement import row_of
 from ..statements.call import Call
-from ..writer import Functions, Writer, offsets
-from .runner import Record, Runner, Start
+from ..writer import Functions, Writer, layout, offsets
+from .runner import Record, Register, Registers, Runner, Start
 
 if TYPE_CHECKING:
     from ...codegen.batch_ir import Batch
@@ -40,7 +40,7 @@ _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
 WORK = 2**23  # nodes times points in a block of a batch: some tenths of a millisecond, several times a thread's start
 MANY = 2**14  # operations that take some microseconds: time enough for Python's other threads
-_RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _POINTER, _COUNT)
+_RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _POINTER, _COUNT, _POINTER)
 _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no NaN and no infinity
 
 
@@ -58,6 +58,7 @@ class NativeRunner(Runner):
                 raise llvm.MissingFunctionError(f"statement {type(statement).__name__} has no text for LLVM")
         self._flags, self._host, self._cache = _FAST if fast else "contract" if fma else "", host, cache
         self._fused = fused(program)
+        self._common = self._all[self.size :]  # the numbers that memories share
         self._nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
         calls = [call for graph in self._fused.graphs() for call in libm_functions(graph).items()]
         self._functions = dict(sorted(calls))
@@ -90,14 +91,15 @@ class NativeRunner(Runner):
         done, (between, within) = ctypes.c_int64(), feed.strides
         if within != _NUMBER or between % _NUMBER:
             feed, between = np.ascontiguousarray(feed), _NUMBER * self.program.feed_width
-        where = ctypes.addressof(done), feed.ctypes.data, between // _NUMBER
+        where = ctypes.addressof(done), feed.ctypes.data, between // _NUMBER, self._common.ctypes.data
         count = self._entry(1)(memory.ctypes.data, rows.ctypes.data, passes, every, *where)
         return Record(rows[:count], done.value)
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes, size, total = self.lanes, self.size, memories.shape[1]
         entry, rows = self._entry(lanes), np.empty((passes // every, self.program.width, total))
-        block = np.zeros((offsets(self._fused_many.registers, self.width)[""], lanes))  # with those of masks
+        sizes = layout(self._fused_many.registers, self.shared, self.width)[1]  # with those of masks
+        block, common = np.zeros((sizes, lanes)), np.repeat(self._common, lanes)
         part, fed, done = np.empty((*rows.shape[:2], lanes)), np.empty((*feed.shape[:2], lanes)), ctypes.c_int64()
         if feed.shape[2] == 1:
             fed[...] = feed
@@ -108,30 +110,32 @@ class NativeRunner(Runner):
             block[:size, :width], block[:size, width:] = memories[:, here], memories[:, start : start + 1]
             if feed.shape[2] > 1:
                 fed[:, :, :width], fed[:, :, width:] = feed[:, :, here], feed[:, :, start : start + 1]
-            where = ctypes.addressof(done), fed.ctypes.data, feed.shape[1]
+            where = ctypes.addressof(done), fed.ctypes.data, feed.shape[1], common.ctypes.data
             entry(block.ctypes.data, part.ctypes.data, passes, every, *where)
             memories[:, here], rows[:, :, here] = block[:size, :width], part[:, :, :width]
         return Record(rows, passes)
 
     def _bind(self, memory: Array, rows: Array | None) -> Callable[..., None]:
         done, none, entry = np.zeros(1, np.int64), np.empty(1), self._entry(1)
-        at, count, nowhere = memory.ctypes.data, done.ctypes.data, none.ctypes.data
+        at, count, nowhere, common = memory.ctypes.data, done.ctypes.data, none.ctypes.data, self._common.ctypes.data
         if rows is not None:
-            call: Callable[..., None] = partial(entry, at, rows.ctypes.data, len(rows), 1, count, nowhere, 0)
+            call: Callable[..., None] = partial(entry, at, rows.ctypes.data, len(rows), 1, count, nowhere, 0, common)
         else:
 
             def call(passes: int) -> None:
-                entry(at, nowhere, passes, passes + 1, count, nowhere, 0)
+                entry(at, nowhere, passes, passes + 1, count, nowhere, 0, common)
 
         call.kept = self, memory, rows, done, none  # type: ignore[attr-defined]  # whose addresses it has
         return call
 
-    def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+    def bind_pass(self, x: Register, y: Register) -> tuple[Callable[[], None], Registers]:
         """The arrays' addresses go into the call."""
         _, entry, places = self.point(x[0], y[0])
         memory, lengths = aligned(places[""]), self.program.registers
         memory[:] = 0.0
         registers = {name: memory[at : at + lengths[name]] for name, at in places.items() if name}
+        for name, numbers in self.shared.items():
+            registers[name][:] = numbers
         return bound_call(entry, x[1], y[1], memory), registers
 
     @made_once
@@ -142,15 +146,20 @@ class NativeRunner(Runner):
         return text, self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG), places
 
     @made_once
-    def columns(self, name: str, start: Start = dict) -> tuple[int, BatchCode]:
-        """The points in a block, and the machine code."""
+    def _column_code(self, name: str) -> tuple[llvm.Code, Batch]:
         arithmetic, alone = Arithmetic(self._flags, self.lanes, self._host.registers), whole_graph(self._fused, name)
         with without_collection():
             text: Batch = self._side.pass_ir(self._fused, name, arithmetic, program_ir)
-        code, places = self._compiled(text.source, self.lanes, looped=alone is None), offsets(self._fused.registers, 1)
+        return self._compiled(text.source, self.lanes, looped=alone is None), text
+
+    def columns_from(self, name: str, start: Start) -> tuple[int, BatchCode]:
+        """The machine code is there after the first call."""
+        (code, text), alone = self._column_code(name), whole_graph(self._fused, name)
+        places, _ = layout(self._fused.registers, self.shared, 1)
+        shared = {places[other]: numbers for other, numbers in self.shared.items() if alone is None}
         begin = {places[other]: numbers for other, numbers in start().items()}
         width = max(WORK // max(1, self._nodes) // self.lanes, 1) * self.lanes
-        return width, self._side.BatchCode(code, self.lanes, text, begin, columns=alone is not None)
+        return width, self._side.BatchCode(code, self.lanes, text, begin, shared, columns=alone is not None)
 
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Registers that outlive a pass, or are results, are in a memory; the others in the code's own."""
@@ -159,7 +168,8 @@ class NativeRunner(Runner):
         arithmetic = Arithmetic(self._flags, self.lanes, self._host.registers, alike=alike)
         lengths, first = self.program.registers, {*outliving(self._fused), *results}
         kept = [name for name in lengths if name in first]
-        program = replace(self._fused, registers={name: lengths[name] for name in dict.fromkeys([*kept, *lengths])})
+        lengths = {name: lengths[name] for name in dict.fromkeys([*kept, *lengths])}
+        program = replace(self._fused, registers=lengths, shared=self.shared)
         with without_collection():
             code: LaneCode = self._side.LaneCode(program, kept, clock, arithmetic, program_ir, self._compiled)
         return code
@@ -173,15 +183,18 @@ def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:
     """A module with `run`, which gives the number of rows of `records` and writes that of passes to `done`.
 
     int64_t run(
-        double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed, int64_t stride
+        double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed, int64_t stride,
+        double *shared
     )
 
-    stride: numbers from a row of the feed to the next.  width: of the vectors in which `Map` goes through its elements.
+    stride: numbers from a row of the feed to the next.  shared: registers that memories share.
+    width: of the vectors in which `Map` goes through its elements.
     """
     functions = Functions(arithmetic, width)
-    ir, places = Writer(program.registers, functions), offsets(program.registers, width)
-    ir.offsets = places
-    ir.pointers = {name: ir.at("%memory", places[name]) for name in program.registers}
+    ir, (places, size) = Writer(program.registers, functions), layout(program.registers, program.shared, width)
+    ir.offsets = {name: place for name, place in places.items() if name not in program.shared}
+    bases = {name: ("%shared", size) if name in program.shared else ("%memory", 0) for name in program.registers}
+    ir.pointers = {name: ir.at(base, places[name] - begin) for name, (base, begin) in bases.items()}
     calls = Counter([id(each.graph) for each in program.statements() if isinstance(each, Call)])
     ir.alone = frozenset([graph for graph, count in calls.items() if count == 1])
     row = ir.room(1, "ptr")
@@ -201,7 +214,7 @@ def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:
             ir.leave_unless(ir.compare("oeq", ir.load(program.stop), 0.0), end)
     first, last = [ir.value(f"ptrtoint ptr {each} to i64") for each in ("%records", ir.load_at(row, "ptr"))]
     rows = ir.integer("sdiv", ir.integer("sub", last, first), max(1, program.width) * ir.size)
-    counts = "i64 %passes, i64 %every, ptr %done, ptr noalias %feed, i64 %stride"
+    counts = "i64 %passes, i64 %every, ptr %done, ptr noalias %feed, i64 %stride, ptr noalias %shared"
     run = ir.function(f"i64 @run(ptr noalias %memory, ptr noalias %records, {counts}) nounwind", f"i64 {rows}")
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
 
@@ -226,18 +239,24 @@ def _moved(ir: Writer, names: Sequence[str], row: str, *, reading: bool) -> str:
     """Registers from a row, where they lie end to end, or to it; the address behind it."""
     for name in names:
         length, register = ir.registers[name], ir.pointer(name)
-        target, source = (register, row) if reading else (row, register)
-        ir.line(copied_bytes(target, source, length * ir.size))
+        ir.copy_bytes(*((register, row) if reading else (row, register)), length * ir.size)
         row = ir.at(row, length)
     return row
 
 
 @explain_failure
-def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: bool = True) -> Runner:
+def runner(
+    program: Program,
+    backend: str = "auto",
+    *,
+    fast: bool = False,
+    fma: bool = True,
+    cache: bool | str = False,
+) -> Runner:
     """A program made ready to run.
 
     backend: "llvm" is machine code (extra `native`), "python" Python over lists; "auto" takes machine code where
-    llvmlite is installed.  fast, fma: liberties with rounding, as in `cg.compile`.
+    llvmlite is installed.  fast, fma, cache: as in `cg.compile`.
     Raises ValueError for an unknown backend, ImportError for "llvm" without llvmlite.
 
     >>> import cgraph as cg
@@ -249,10 +268,10 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
     [4.0, 2.0, 1.0]
     """
     require_choice("backend", backend, BACKENDS)
-    fast, fma = require_flag("fast", fast), require_flag("fma", fma)
+    fast, fma, kept = require_flag("fast", fast), require_flag("fma", fma), cache_choice(cache)
     if backend != "python":
         try:
-            return NativeRunner(program, fast=fast, fma=fma)
+            return NativeRunner(program, fast=fast, fma=fma, cache=cache_folder(kept))
         except (ImportError, llvm.MissingFunctionError):
             if backend == "llvm":
                 raise

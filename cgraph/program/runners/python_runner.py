@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from ...util.require import require_kind
 from ..program import Program, whole_graph
 from ..statement import Execution
 from ..statements.call import spread
-from .runner import Record, Runner, Start
+from .runner import Columns, Record, Register, Registers, Runner, Start
 
 BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
 STATES = 512  # states of a batch that are run between looks at the keyboard
@@ -39,7 +39,8 @@ class PythonRunner(Runner):
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         program, execution = self.program, self._execution
-        state = {name: memory[place].tolist() for name, place in self._slices.items()}
+        state = {name: numbers.tolist() for name, numbers in self.shared.items()}
+        state |= {name: memory[place].tolist() for name, place in self._slices.items()}
         rows: list[list[float]] = []
         done = 0
         for done in range(1, passes + 1):
@@ -58,6 +59,7 @@ class PythonRunner(Runner):
         execution = Execution(masked.registers, self._at, self._batch, count)
         state = {name: np.zeros((length, count)) for name, length in masked.registers.items()}
         state |= {name: memories[place].copy() for name, place in self._slices.items()}
+        state |= {name: np.broadcast_to(each[:, None], (len(each), count)) for name, each in self.shared.items()}
         rows = np.empty((passes // every, program.width, count))
         for done in range(1, passes + 1):
             spread(np.broadcast_to(feed[done - 1], (program.feed_width, count)), program.feed, state)
@@ -76,9 +78,10 @@ class PythonRunner(Runner):
 
         return run
 
-    def bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+    def bind_pass(self, x: Register, y: Register) -> tuple[Callable[[], None], Registers]:
         """Registers are lists in between."""
-        arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
+        arrays = {name: np.zeros(n) for name, n in self.program.registers.items() if name not in (x[0], y[0])}
+        arrays |= {name: numbers.copy() for name, numbers in self.shared.items()}
         flat, point = y[1].reshape(-1), x[1]
         if (graph := whole_graph(self.program, x[0])) is not None:
             if self._backend == "numpy":
@@ -101,7 +104,7 @@ class PythonRunner(Runner):
 
         return run, arrays
 
-    def columns(self, name: str, start: Start = dict) -> tuple[int, Callable[[Array, Array], None]]:
+    def columns_from(self, name: str, start: Start) -> tuple[int, Columns]:
         """Of one graph its function of arrays; "python" alone goes point by point."""
         if (graph := whole_graph(self.program, name)) is None:
             begin = start()

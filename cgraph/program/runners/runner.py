@@ -12,15 +12,19 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import GraphError
 from ...core.evaluation import Array, real_array
-from ...util.memory import require_memory
+from ...util.caches import made_once
+from ...util.memory import aligned, require_memory
 from ...util.require import require_kind, require_mapping, require_whole
 from ..many import many
 from ..program import Program
-from ..writer import offsets
+from ..writer import layout
 
 if TYPE_CHECKING:
     from .batch_code import LaneCode
 
+Register = tuple[str, Array]  # of a name these numbers
+Registers = Mapping[str, Array]  # by names
+Columns = Callable[[Array, Array], None]
 Start = Callable[[], Mapping[str, Array]]  # gives initial values of registers
 
 
@@ -45,6 +49,8 @@ class Runner(ABC):
     """A program ready to run; made by `runner`. It can `run` on a memory of all registers, `bind` one, and tell `text`.
 
     width: numbers in a vector of `Map`, to a multiple of which registers are padded.  size: numbers in a memory.
+    shared: {register that all memories share: its numbers}, which may be changed between runs by who knows that they
+    fit, or asks `program.check_shared`.
 
     >>> from cgraph.extend import Program, runner
     >>> run = runner(Program({"x": 1}, [], record=["x"]), "python")
@@ -58,9 +64,14 @@ class Runner(ABC):
 
     def __init__(self, program: Program, width: int = 1) -> None:
         self.program, self.width = program, width
-        places = offsets(program.registers, width)
-        self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
-        self.size = places[""]
+        places, self.size = layout(program.registers, program.shared, width)
+        slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
+        self._slices = {name: place for name, place in slices.items() if name not in program.shared}
+        self._all = aligned(places[""])
+        self._all[:] = 0.0
+        self.shared = {name: self._all[slices[name]] for name in program.shared}
+        for name, numbers in program.shared.items():
+            self.shared[name][:] = numbers
 
     @cached_property
     def masked(self) -> Program:
@@ -145,6 +156,19 @@ class Runner(ABC):
         bits that it has alone; else sines and such are those of vectors.
         """
         return None
+
+    @abstractmethod
+    def bind_pass(self, x: Register, y: Register) -> tuple[Callable[[], None], Registers]:
+        """A function of nothing that runs a pass from one register to another, both in arrays; and the others."""
+
+    @made_once
+    def columns(self, name: str, start: Start = dict) -> tuple[int, Columns]:
+        """As `columns_from`, kept for this start."""
+        return self.columns_from(name, start)
+
+    @abstractmethod
+    def columns_from(self, name: str, start: Start) -> tuple[int, Columns]:
+        """Points in a block, and the function that writes what is recorded of a pass from each of them, in columns."""
 
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...

@@ -269,7 +269,8 @@ def call_text(call: Call, writer: Writer) -> None:
     """Write as machine code."""
     registers = list(dict.fromkeys((*call.inputs, *call.outputs)))
     reads, writes = (tuple([registers.index(name) for name in names]) for names in (call.inputs, call.outputs))
-    begins = tuple([writer.offsets[name] for name in registers]) if id(call.graph) in writer.alone else ()
+    in_memory = id(call.graph) in writer.alone and all(name in writer.offsets for name in registers)
+    begins = tuple([writer.offsets[name] for name in registers]) if in_memory else ()
     how, lengths = (call.products, call.exact, begins), writer.lengths(registers)
     name = writer.functions.call(call.graph, lengths, reads, writes, *how)
     writer.call(name, ["%memory"] if begins else [writer.pointer(register) for register in registers])

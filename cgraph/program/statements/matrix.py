@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...codegen.arithmetic import Arithmetic
-from ...codegen.function_writer import FunctionWriter
+from ...codegen.function_writer import Arithmetic, FunctionWriter
 from ...core.evaluation import Array
 from ..statement import Execution, Lengths, Statement, length_of, require_length
 
@@ -130,16 +129,10 @@ def scatter_text(statement: Scatter, writer: Writer) -> None:
 
 
 def _largest(a: Array, k: int) -> Any:
-    """argmax over i >= k of |a[i, k]|, in every lane: not NumPy's, since a NaN must not win, as in machine code."""
-    row: Any = k
-    best = abs(a[k, k])
-    for i in range(k + 1, len(a)):
-        size = abs(a[i, k])
-        if a.ndim > 2:
-            row, best = np.where(size > best, i, row), np.where(size > best, size, best)
-        elif size > best:
-            row, best = i, size
-    return row
+    """argmax over i >= k of |a[i, k]|, in every lane; as in machine code a NaN wins in row k alone."""
+    sizes = abs(a[k:, k])
+    sizes[1:][np.isnan(sizes[1:])] = -1.0
+    return k + np.argmax(sizes, axis=0)  # which takes the first NaN
 
 
 def _exchange(b: Array, k: int, pivots: Array) -> None:

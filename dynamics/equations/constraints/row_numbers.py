@@ -16,8 +16,7 @@ from cgraph.extend import Builder, cotangents
 
 from ...systems.arguments import new_variables
 from ...systems.constraints import ConstraintError, Constraints
-from ...systems.kinematics import ONE, numbered_graph
-from ..substitute import substitute
+from ...systems.kinematics import ONE, numbered_graph, substitute
 
 SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 3  # of random starts about the neutral coordinates
 ITERATIONS = 100  # of least squares for such a state

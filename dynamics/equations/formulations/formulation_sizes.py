@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 from typing import NamedTuple
 
 from cgraph import Graph, Node
@@ -11,10 +12,9 @@ from cgraph import Graph, Node
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
-from .blame import Blame, blame
 from .formulations import inverse_dynamics, momentum_rate
 from .lagrange_terms import momenta, torques
-from .verdict import formulation_verdict
+from .verdict import Blame, blame, formulation_verdict
 
 PAPER = ("by_definition", "kinetic_only", "chain_rule")  # of Figures 1 to 3, in this order
 INERTIAL_TERM, TORQUE = "p and dp/dt", "tau"
@@ -37,13 +37,6 @@ class FormulationSize(NamedTuple):
     spurious_nodes: int
     spurious_edges: int
     missing_terms: int
-
-
-def formulation_size(graph: Graph, wrong: Blame) -> FormulationSize:
-    """The size of one graph of `inverse_dynamics` or `momentum_rate`, by any formulation."""
-    counts = graph.counts()
-    edges = sum([edge.source in wrong.nodes or edge in wrong.edges for edge in graph.edges])
-    return FormulationSize(counts.nodes, counts.edges, counts.depth, len(wrong.nodes), edges, len(wrong.cancelled))
 
 
 def blamed(model: Model, term: str, formulation: str) -> tuple[Graph, Blame]:
@@ -74,8 +67,10 @@ def formulation_sizes(model: Model) -> dict[tuple[str, str], FormulationSize]:
     >>> [(term, size.spurious_nodes, size.nodes) for (term, name), size in sizes.items() if name == "by_definition"]
     [('p and dp/dt', 10, 20), ('tau', 4, 18)]
     """
-    return {
-        (term, formulation): formulation_size(*blamed(model, term, formulation))
-        for term in TERMS
-        for formulation in PAPER
-    }
+    sizes = {}
+    for term, formulation in product(TERMS, PAPER):
+        graph, wrong = blamed(model, term, formulation)
+        edges = sum([edge.source in wrong.nodes or edge in wrong.edges for edge in graph.edges])
+        faults = len(wrong.nodes), edges, len(wrong.cancelled)
+        sizes[term, formulation] = FormulationSize(len(graph.nodes), len(graph.edges), graph.counts().depth, *faults)
+    return sizes

@@ -54,16 +54,10 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
     ['chain_rule', 'chain_rule_literal', 'by_definition', 'kinetic_only', 'kinetic_only_exact', 'newton_euler']
     """
     system = as_system(model)
-    if formulation is not None:
-        formulation = formulation_name(formulation)
+    name = None if formulation is None else formulation_name(formulation)
     require_flag("simplify", simplify)
-    if formulation is None:
-        formulation, graph = _smaller(system)
-    else:
-        graph = cg.simplify(torques(system, formulation))
-    if not simplify:
-        graph = torques(system, formulation)
-    return remarked(graph, partial(_remarks, model, formulation, torques))
+    name, graph = _smaller(system) if name is None else (name, cg.simplify(torques(system, name)))
+    return remarked(graph if simplify else torques(system, name), partial(_remarks, model, name, torques))
 
 
 @Equation("q qd qdd", Output("p{}_dot", ("n",), "N m or N")).describes

@@ -8,26 +8,146 @@ is 0 at every state.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property, partial, reduce
+from operator import or_
 from typing import TYPE_CHECKING, NamedTuple
 
-from cgraph import Edge, Graph, Node, _shared, extend, jacobian, simplify
-from cgraph._shared import Remarks, counted, remarked, require_mapping, shortened
+import numpy as np
+
+import cgraph as cg
+from cgraph import Edge, Graph, GraphError, Node, _shared, extend, jacobian, simplify
+from cgraph._shared import (
+    Remarks,
+    counted,
+    or_nearest,
+    real_number,
+    remarked,
+    require_graph,
+    require_mapping,
+    shortened,
+)
 from cgraph.extend import Builder, Names, building, cotangents, folded
 
-from ...systems.kinematics import ONE
+from ...systems.arguments import new_variables
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system, display_names
 from ...systems.system import System
 from ..equation import documented
-from .blame import Derive, blame, split
-from .lagrange_terms import THROUGH_STEP, formulation_name, torques
-from .verdict_state import STATES, asked_state, chosen_state, numbers_of
+from .lagrange_terms import COUPLING, THROUGH_STEP, formulation_name, torques
+
+Derive = Callable[[System, str, Node], Graph]
+
+
+class Blame(NamedTuple):
+    """Nodes and edges that a graph has from the derivative through the step.
+
+    nodes: they serve nothing else.  edges: by these it enters what is sound, or another use of a sound node is wrong.
+    cancelled: outputs that have no such edge left, since simplification took it away together with a right one.
+    """
+
+    nodes: frozenset[Node] = frozenset()
+    edges: frozenset[Edge] = frozenset()
+    cancelled: tuple[str, ...] = ()
+
+
+def split(system: System, formulation: str, derive: Derive) -> tuple[Graph, Node]:
+    """Torques or momenta by a formulation of `THROUGH_STEP`, and an input by which all that comes by it is multiplied.
+
+    At 1 they are its own, at 0 those without the step.
+    """
+    (through,) = new_variables("through", 1, system.parameters)
+    return cg.simplify(derive(system, formulation, through)), through
+
+
+def blame(
+    system: System, formulation: str, derive: Derive, graph: Graph, known: tuple[Graph, Node] | None = None
+) -> Blame:
+    """Blame for what the graph has by the derivative through the step, whether its value is 0 or not.
+
+    derive: `torques` or `momenta`, of which `graph` is the simplified graph by this formulation.  known: its `split`.
+
+    All that comes through the step is multiplied by a variable. What folds to 0 when that is 0 is wrong, and the edges
+    that lead out of it are to blame; at 1 the graph is the formulation's, node by node.
+    """
+    if formulation not in THROUGH_STEP:
+        return Blame()
+    marked, through = known or split(system, formulation, derive)
+    without, whole = (
+        dict(zip(marked.nodes, folded(marked.nodes, Builder(), {through: factor}), strict=True))
+        for factor in (ZERO, ONE)
+    )
+    wrong = {node for node in marked.nodes if without[node].value == 0.0 and node.value != 0.0}
+    image = Graph(graph.inputs, {name: whole[node] for name, node in marked.outputs.items()})
+    same = dict(cg.compare(image, graph).common)
+    leaving = {edge for edge in marked.edges if edge.source in wrong and edge.target not in wrong}
+    drawn: dict[Edge, Edge] = {}
+    for edge in leaving:
+        source, target = same.get(whole[edge.source]), same.get(whole[edge.target])
+        if source is not None and target is not None and source in target.args:
+            drawn[edge] = Edge(source, target, target.args.index(source))
+    edges, reach = frozenset(drawn.values()), dict.fromkeys(marked.nodes, 0)
+    for k, node in enumerate(marked.outputs.values()):
+        reach[node] |= 1 << k
+    for node in reversed(marked.nodes):  # which outputs need it, a bit each
+        for arg in node.args:
+            reach[arg] |= reach[node]
+    touched, left = (reduce(or_, [reach[edge.target] for edge in each], 0) for each in (leaving, drawn))
+    cancelled = tuple([name for k, name in enumerate(marked.outputs) if touched & ~left & 1 << k])
+    outputs = [graph.outputs[name] for name, node in marked.outputs.items() if node not in wrong]
+    return Blame(frozenset(graph.nodes) - _needed(outputs, edges), edges, cancelled)
+
+
+def spurious_nodes(graph: Graph) -> frozenset[Node]:
+    """Nodes that are there only because a derivative was taken through the embedded Euler relation.
+
+    They are the adjoints that the product qd dt of q = qd dt + q_old passes on, the "unnecessary terms" of eq. (3), and
+    all that only these need, whether the author of the Lagrangian tagged anything or not. Where a slope dL/dq does not
+    change along the step, such as a weight m g, the derivative of m g dt is the node m g itself, which is not marked:
+    there an edge is wrong. Whether the torque is wrong, and by which edges, `formulation_verdict` says.
+
+    Parameters
+    ----------
+    graph : Graph
+        One of `inverse_dynamics` or `momentum_rate`, by any formulation.
+
+    Returns
+    -------
+    frozenset of Node
+        Empty for a formulation by the chain rule.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.scenes.load("spring_mass")
+    >>> [len(dyn.spurious_nodes(dyn.momentum_rate(spring, name))) for name in ("chain_rule", "by_definition")]
+    [0, 13]
+    """
+    require_graph("spurious_nodes", graph)
+    coupling = {node for node in graph.nodes if COUPLING in node.tags and "adjoint" in node.roles}
+    entering = frozenset([edge for edge in graph.edges if edge.source in coupling])
+    outputs = [node for node in graph.outputs.values() if node not in coupling]
+    return frozenset(graph.nodes) - _needed(outputs, entering)
+
+
+def _needed(outputs: list[Node], cut: frozenset[Edge]) -> set[Node]:
+    """The nodes that outputs need when these edges are cut."""
+    closed = {(edge.target, edge.slot) for edge in cut}
+    needed: set[Node] = set()
+    stack = list(outputs)
+    while stack:
+        node = stack.pop()
+        if node not in needed:
+            needed.add(node)
+            stack.extend([arg for slot, arg in enumerate(node.args) if (node, slot) not in closed])
+    return needed
+
 
 if TYPE_CHECKING:
     from cgraph._shared import Json
 
+STATES = 24  # tried where c does not fold to 0: a third of size 1, the rest of sizes from 1e-6 to 1e6
 WRITTEN = 200  # nodes of c that identities are tried on
 SHOWN, NAMED, FORMULA = 6, 3, 60  # coordinates in the text and in its summary, and characters of a formula
 HOW = {
@@ -54,6 +174,11 @@ class Excess(NamedTuple):
     torque: float
     right: float
 
+    @property
+    def slope(self) -> str:
+        """The symbol without the velocity."""
+        return self.symbol.partition(".")[0].strip("()")
+
     def __str__(self) -> str:
         number = f"{self.value:.6g}"
         return " = ".join(dict.fromkeys(filter(None, (self.symbol, self.formula, number))))
@@ -77,20 +202,6 @@ class Off(NamedTuple):
     def __str__(self) -> str:
         slopes = f"{self.slopes} of {self.of_slopes} slopes d tau/d(q, qd)"
         return f"Off are {self.torques} of {counted(self.of_torques, 'torque')} and {slopes}."
-
-
-def off_at(graph: Graph, terms: Graph | None, at: Mapping[str, float], torques: int) -> Off:
-    """The count at a state.  graph: the torques.  terms: what each is off by.  torques: how many are off."""
-    found = [re.fullmatch(r"(qd?\d+)(?:_old)?", name) for name in graph.input_names]
-    state = [each[1] for each in found if each]  # coordinates and velocities, after the step
-    of_torques = sum([name.startswith("tau") for name in graph.outputs])
-    if terms is None or not torques:
-        return Off(0, of_torques, 0, of_torques * len(state))
-    slopes = jacobian(terms, wrt=[name for name in state if name in terms.input_names])
-    known = {name: at.get(name, 1.0) for name in slopes.input_names}  # of what no torque uses any number
-    digits, values = extend.certain_digits(slopes, known), slopes.evaluate(known)
-    wrong = [name for name, value in values.items() if value and digits[name] >= 1.0]
-    return Off(torques, of_torques, len(wrong), of_torques * len(state))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +270,14 @@ rate, which cancels the -dL/dq of Lagrange's equation.
     @cached_property
     def off(self) -> Off:
         """How many torques and slopes d tau / d(q, qd) are off at `at`: 0 where nothing differs."""
-        return off_at(self.graph, self.terms, self.at, len(self.excess))
+        found = [re.fullmatch(r"(qd?\d+)(?:_old)?", name) for name in self.graph.input_names]
+        state = [each[1] for each in found if each]  # coordinates and velocities, after the step
+        wrong, of_torques = 0, sum([name.startswith("tau") for name in self.graph.outputs])
+        if self.terms is not None and self.excess:
+            slopes = jacobian(self.terms, wrt=[name for name in state if name in self.terms.input_names])
+            known = {name: self.at.get(name, 1.0) for name in slopes.input_names}  # of what no torque uses any number
+            wrong = sum([value != 0.0 for value in _certain(slopes, known).values()])
+        return Off(len(self.excess), of_torques, wrong, of_torques * len(state))
 
     def excess_at(self, at: Mapping[str, float]) -> dict[str, float]:
         """{"tau1": what it is off by} at a state, of the outputs where that is not 0, as dt tends to 0.
@@ -197,22 +315,23 @@ rate, which cancels the -dL/dq of Lagrange's equation.
         meant = {shown: name for name, shown in self.names.items()}
         given = {meant.get(name, name): value for name, value in given.items()}
         known = {name: given[name] for name in self.terms.input_names if name in given}
-        digits, values = extend.certain_digits(self.terms, known), self.terms.evaluate(known)
-        return {name: float(value) for name, value in values.items() if value and digits[name] >= 1.0}
+        return {name: value for name, value in _certain(self.terms, known).items() if value}
 
     def __str__(self) -> str:
         if not self.excess:
             return f"{self.summary} {self.taken}".strip()
-        called = Names(self.graph, self.names)
         texts = [f"{self.names.get(name, name)}={value:g}" for name, value in self.at.items()]
         where = _listed(texts, len(texts) if self.asked else SHOWN)
         lines = [f"{HOW[self.formulation]}, the torque is wrong at every dt, however small. At {where}:"]
         for name, each in [*self.excess.items()][:SHOWN]:
             values = f"{each.torque:.6g}, by the chain rule {each.right:.6g}"
-            lines.append(f"  {called.shown(name)} is {values}: off by {each}")
+            lines.append(f"  {self._called.shown(name)} is {values}: off by {each}")
         lines += [f"  and {len(self.excess) - SHOWN} more"] if len(self.excess) > SHOWN else []
-        more = self.why, self._spurious(called) if self.edges else "", self.lacking, self.taken
-        return "\n".join([*lines, *filter(None, more)])
+        return "\n".join([*lines, *self._explained(listed=True)])
+
+    @cached_property
+    def _called(self) -> Names:
+        return Names(self.graph, self.names)
 
     @property
     def summary(self) -> str:
@@ -222,10 +341,9 @@ rate, which cancels the -dL/dq of Lagrange's equation.
             return f"{begin} right: {self.reason}."
         if not self.excess:
             return f"{begin} not shown to be right: {self.reason}."
-        called = Names(self.graph, self.names)
-        names, terms = [called.shown(name) for name in self.excess], list(self.excess.values())
+        names, terms = [self._called.shown(name) for name in self.excess], list(self.excess.values())
         if len(terms) > 1:
-            off = f"{_listed(names, NAMED)} are off, each by its {terms[0].symbol.partition('.')[0].strip('()')}"
+            off = f"{_listed(names, NAMED)} are off, each by its {terms[0].slope}"
         else:
             off = f"{names[0]} is off by {terms[0].symbol}{terms[0].formula and f' = {terms[0].formula}'}"
         return f"{begin} wrong at every dt, however small: {off}."
@@ -235,7 +353,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
         """Sentences on why it differs; empty where it does not."""
         if not self.excess:
             return ""
-        slope = next(iter(self.excess.values())).symbol.partition(".")[0].strip("()")
+        slope = next(iter(self.excess.values())).slope
         return (
             f"Why: the derivative by qd went through {_step(slope)}. That adds dt {slope} to the momentum and {slope} "
             f"to its rate, which cancels the -{slope} of Lagrange's equation."
@@ -246,8 +364,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
         """Sentence on right terms that the spurious one has cancelled; empty where there are none."""
         if not self.missing:
             return ""
-        called = Names(self.graph, self.names)
-        outputs, terms = (_listed(each) for each in (map(called.shown, self.missing), map(str, self.missing.values())))
+        outputs, terms = _listed(map(self._called.shown, self.missing)), _listed(map(str, self.missing.values()))
         verb = "are" if len(self.missing) > 1 else "is"
         return (
             f"In {outputs} nothing spurious is left to be marked: a right term is gone with it. {terms} {verb} missing."
@@ -256,13 +373,16 @@ rate, which cancels the -dL/dq of Lagrange's equation.
     @property
     def explanation(self) -> str:
         """Sentences that follow the summary: why it differs, and how much of the graph is spurious; else empty."""
-        spurious = spurious_text(len(self.graph.nodes), len(self.nodes), len(self.edges))
-        return " ".join(filter(None, (self.why, f"{spurious}." if self.edges else "", self.lacking, self.taken)))
+        return " ".join(self._explained(listed=False))
 
-    def _spurious(self, called: Names) -> str:
-        edges = [edge for edge in self.graph.edges if edge in self.edges]
-        texts = _listed([f"{called.text(edge.source)} -> {called.text(edge.target)}" for edge in edges])
-        return f"{spurious_text(len(self.graph.nodes), len(self.nodes), len(edges))}: {texts}."
+    def _explained(self, *, listed: bool) -> list[str]:
+        """Sentences after the summary.  listed: whether spurious edges are told one by one."""
+        spurious = spurious_text(len(self.graph.nodes), len(self.nodes), len(self.edges)) if self.edges else ""
+        if listed:
+            shown = [edge for edge in self.graph.edges if edge in self.edges]
+            texts = [f"{self._called.text(edge.source)} -> {self._called.text(edge.target)}" for edge in shown]
+            spurious += f": {_listed(texts)}" if texts else ""
+        return [*filter(None, (self.why, spurious and f"{spurious}.", self.lacking, self.taken))]
 
     def _repr_html_(self) -> str:
         return f"{_shared.html_lines(str(self))}{_shared.render_html('graph', self.graph) or ''}"
@@ -322,7 +442,8 @@ def formulation_verdict(
 = qd dt + q_old adds nothing. K is the terms of L tagged 'kinetic'.
     """
     system, names = as_system(model), display_names(model)
-    formulation, given = formulation_name(formulation), numbers_of(at)
+    formulation, stated = formulation_name(formulation), {} if at is None else require_mapping("at", at, "name: number")
+    given = {name: real_number(f"at: {name!s:.80}", value) for name, value in stated.items()}
     graph = remarked(simplify(torques(system, formulation)), partial(remarks, model, formulation, torques))
     taken = system.energies.taken if formulation.startswith("kinetic") else ""
     if formulation not in THROUGH_STEP:
@@ -336,7 +457,7 @@ def formulation_verdict(
         free = "L does not depend on q" if formulation == "by_definition" else "the mass matrix does not depend on q"
         reason = f"{free}, {slope} is 0, and the derivative through {_step(slope)} adds nothing"
         return replace(alike, reason=reason)
-    chosen, finite = chosen_state(system, terms, alike.excess_at)
+    chosen, finite = _chosen_state(system, terms, alike.excess_at)
     if not finite:
         reason = f"{slope} is finite at none of the {STATES} states tried"
         return replace(alike, differs=True, proved=False, reason=reason)
@@ -344,7 +465,7 @@ def formulation_verdict(
     if not found:
         reason = f"{slope} is 0 to rounding at all {finite} states tried, though its form does not prove it"
         return replace(alike, proved=False, reason=reason)
-    state = chosen | asked_state(names, chosen, given)
+    state = chosen | _asked_state(names, chosen, given)
     there = alike.excess_at(state) if given else found
     values = {name: there.get(name, 0.0) for name in terms.outputs if name in found or name in there}
     marked = split(system, formulation, torques)
@@ -399,10 +520,15 @@ def _step(slope: str) -> str:
 
 
 def _torques(graph: Graph, through: Node, at: Mapping[str, float], factor: float) -> dict[str, float]:
-    """The torques as dt tends to 0, with what comes through the step times a factor; what rounding alone made is 0."""
+    """The torques as dt tends to 0, with what comes through the step times a factor."""
     given = {"dt": 0.0, str(through.name): factor}
     known = {name: given[name] if name in given else at[name.removesuffix("_old")] for name in graph.input_names}
-    digits, values = extend.certain_digits(graph, known), graph.evaluate(known)
+    return _certain(graph, known)
+
+
+def _certain(graph: Graph, at: Mapping[str, float]) -> dict[str, float]:
+    """The outputs at a point; 0 where rounding may have made all of it."""
+    digits, values = extend.certain_digits(graph, at), graph.evaluate(at)
     return {name: float(value) if digits[name] >= 1.0 else 0.0 for name, value in values.items()}
 
 
@@ -421,3 +547,38 @@ def _listed(texts: Iterable[str], most: int = SHOWN) -> str:
     """Text of a few texts, or of the first of many."""
     shown = list(texts)
     return ", ".join(shown if len(shown) <= most else [*shown[:most], f"and {len(shown) - most} more"])
+
+
+def _chosen_state(
+    system: System, terms: Graph, excess_at: Callable[[dict[str, float]], dict[str, float]]
+) -> tuple[dict[str, float], int]:
+    """The first state at which c is not 0, else the last; and at how many it was finite.
+
+    States are about the neutral one, always the same, of three digits, so that a person can type them again.
+    """
+    names, accelerations = terms.input_names, [str(node.name) for node in system.qdd]
+    rng, finite, at = np.random.default_rng(0), 0, dict[str, float]()
+    neutral = {f"q{i}": number for i, number in enumerate(system.kinematics.neutral)}
+    for k in range(STATES):
+        sizes = 10.0 ** rng.uniform(-6.0, 6.0, len(names)) if k >= STATES // 3 else np.ones(len(names))
+        drawn = rng.uniform(-1.0, 1.0, len(names)) * sizes
+        drawn = np.abs(drawn) if k % 2 else drawn  # where a root or a logarithm is
+        numbers = {name: neutral.get(name, 0.0) + x for name, x in zip(names, drawn, strict=True)}
+        at = {name: float(f"{x:.3g}") for name, x in numbers.items()} | system.parameters
+        if np.isfinite([float(value) for value in terms.evaluate(at).values()]).all():
+            finite += 1
+            if excess_at(at):
+                break
+    drawn = np.random.default_rng(1).uniform(-1.0, 1.0, system.n)
+    qdd = {name: float(f"{x:.3g}") for name, x in zip(accelerations, drawn, strict=True)}
+    order = [*names[: system.nq + system.n], *qdd, *names[system.nq + system.n :]]
+    return {name: (at | qdd)[name] for name in order}, finite
+
+
+def _asked_state(names: Mapping[str, str], known: Mapping[str, float], at: Mapping[str, float]) -> dict[str, float]:
+    """The state that is asked for, by the graph's names. Raises GraphError for a name that is none."""
+    meant = {names.get(name, name): name for name in known}
+    for name in at:
+        if name not in known and name not in meant:
+            raise GraphError(f"at: there is no {name!s:.80}; {or_nearest(str(name), [*meant])}")
+    return {meant.get(name, name): value for name, value in at.items()}

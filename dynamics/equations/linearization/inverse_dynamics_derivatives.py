@@ -9,11 +9,10 @@ from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, folded
 
 from ...systems.body_terms import TorqueDerivatives
-from ...systems.kinematics import ONE
+from ...systems.kinematics import ONE, Kinematics, substitute
 from ...systems.system import System
 from ..equation import Equation, Output, entries, mirrored
 from ..formulations.lagrange_terms import torques
-from ..substitute import substitute
 
 ROWS = ("n", "n")
 
@@ -69,7 +68,7 @@ def torque_derivatives(
         for i, (brake, force) in enumerate(zip(braking, forces, strict=True)):
             torque[i] = torque[i] + brake - force
             by_qd[i] = [slope + damping for slope, damping in zip(by_qd[i], system.damping_rows[i], strict=True)]
-    for i, slopes in enumerate(state_slopes(system, forces, build)):
+    for i, slopes in enumerate(state_slopes(system.kinematics, forces, build)):
         slopes = folded(slopes, build, at) if pulls else slopes
         with building(build):
             row = [entry - slope for entry, slope in zip([*by_q[i], *by_qd[i]], slopes, strict=True)]
@@ -83,14 +82,15 @@ def _derived(system: System, at: Mapping[Node, Node], build: Builder, pulls: Seq
     if pulls:
         with building(build):
             torque = [tau - pull for tau, pull in zip(torque, pulls, strict=True)]
-    slopes = state_slopes(system, torque, build)
+    slopes = state_slopes(system.kinematics, torque, build)
     flat = folded(substitute([*torque, *entries(slopes)], at), build)
     rows = [flat[k : k + 2 * n] for k in range(n, len(flat), 2 * n)]
     mass = mirrored(system.mass_matrix(system.lagrangian, build))
     return TorqueDerivatives(flat[:n], [row[:n] for row in rows], [row[n:] for row in rows], mass)
 
 
-def state_slopes(system: System, nodes: Sequence[Node], build: Builder) -> list[list[Node]]:
+def state_slopes(kinematics: Kinematics, nodes: Sequence[Node], build: Builder) -> list[list[Node]]:
     """Rows of d(nodes)/d(q, qd), 2n each; of quasi-velocities by displacements xi, dq = G xi."""
-    split, bars = system.nq, [cotangents({node: ONE}, [*system.q, *system.qd], build) for node in nodes]
-    return [[*system.kinematics.pulled_back(row[:split], build), *row[split:]] for row in bars]
+    split, state = len(kinematics.q), [*kinematics.q, *kinematics.u]
+    bars = [cotangents({node: ONE}, state, build) for node in nodes]
+    return [[*kinematics.pulled_back(row[:split], build), *row[split:]] for row in bars]

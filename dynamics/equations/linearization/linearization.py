@@ -1,4 +1,7 @@
-"""Linearization: the exact derivative of the state equation or of Hamilton's, as a graph, at a state and at many."""
+"""Linearization: the exact derivative of the state equation or of Hamilton's, as a graph, at a state and at many.
+
+Of a constrained system also in displacements that the constraints admit, independent of one another.
+"""
 
 from __future__ import annotations
 
@@ -10,24 +13,31 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array, kept_by_first, require_choice
-from cgraph.extend import Builder, building, folded
+from cgraph._shared import Array, kept_by_first, require_choice, solve_tangents
+from cgraph.extend import Builder, building, cotangents, folded, tangents, topological
 
-from ...systems.kinematics import ZERO, numbered_graph
+from ...systems.constraints import ConstraintError
+from ...systems.kinematics import ONE, ZERO, dot, numbered_graph
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..bias_terms import bias_terms
+from ..constraints.constraint_rank import DEPENDENT, independent_rows
 from ..equation import Equation, Output, documented, shortened
 from ..equations_of_motion import forward_dynamics
+from ..mass_matrix.accelerations import longest_path
 from ..mass_matrix.singular_mass_matrix import raise_if_singular
 from ..state_equation import FORMS
 from ..states.evaluate import evaluate, input_rows
-from ..states.initial_value import normalized
-from .linearization_parts import by_upper, linearization_parts
-from .momentum_parts import momentum_parts, of_momenta
+from ..states.initial_value import normalized, parameter_values, start_state
+from .inverse_dynamics_derivatives import state_slopes
+from .linearization_parts import by_upper, linearization_parts, momentum_parts, of_momenta
 
 # Nodes; beyond, slopes along directions are made in a fraction of the time, and soon are as fast.
 WRITTEN_OUT = 20_000
 FORWARD_SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
+# Coordinates from the world to a tip. Beyond, forces of inertia add up to so much more than is left of them that
+# rounding is more than 2e-14 of the largest entry, and forward dynamics itself is differentiated.
+LONG_PATH = 32
 _slopes = kept_by_first(cg.jvp)
 _machine_code = kept_by_first(cg.compile)
 
@@ -95,16 +105,18 @@ class LinearRows(NamedTuple):
 
     graph: their entries row by row, or the rates that have them as slopes by `wrt`.  inputs: names of those that a
     state gives; behind them are displacements, which are 0.  wrt: displacements, velocities and forces, or none.
+    turned: whether the graph has sums of rows instead, whose slopes by weights, behind the inputs, are the columns.
     """
 
     graph: Graph
     inputs: Sequence[str]
     wrt: tuple[Node, ...]
     above: Array
+    turned: bool = False
 
 
 def linear_rows(system: System, form: str) -> LinearRows:
-    """All entries, or of a large system the rates that `forward_dynamics` gives."""
+    """All entries, or of a large system sums of rows, or the rates that `forward_dynamics` gives."""
     return _linear_rows(system, form, (tuple(system.forces), tuple(system.damping)))
 
 
@@ -112,11 +124,14 @@ def linear_rows(system: System, form: str) -> LinearRows:
 def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows:
     """The last: forces and damping of the system, which may be given anew."""
     n, velocity = system.n, form == "velocity"
-    if velocity and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // FORWARD_SHARE:
-        return _displaced_rates(system)
-    parts = linearization_parts(system) if velocity else momentum_parts(system)
-    if velocity and parts.size >= WRITTEN_OUT:
-        return _displaced_rates(system)
+    if velocity:
+        equations = forward_dynamics(system)
+        large = len(equations.nodes) >= WRITTEN_OUT // FORWARD_SHARE
+        if large or (parts := linearization_parts(system)).size >= WRITTEN_OUT:
+            held = len(system.constraints) or longest_path(system.lagrangian, system.qd) > LONG_PATH
+            return _displaced_rates(system, equations) if held else _summed_rows(system, equations)
+    else:
+        parts = momentum_parts(system)
     graph = parts.written_out()
     above = np.eye(n if velocity and system.kinematics.quasi is None else 0, 3 * n, n)
     below = range(len(above), 2 * n)
@@ -125,9 +140,16 @@ def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows
     return LinearRows(rows, graph.input_names, (), above)
 
 
-def _displaced_rates(system: System) -> LinearRows:
+def _summed_rows(system: System, equations: Graph) -> LinearRows:
+    """Sums of rows.  equations: forward dynamics."""
+    weights = tuple(cg.variables([f"row:{i}" for i in range(2 * system.n)]))
+    graph = numbered_graph([*equations.inputs, *weights], row_sums(system, equations, weights))
+    return LinearRows(graph, equations.input_names, weights, np.empty((0, 3 * system.n)), turned=True)
+
+
+def _displaced_rates(system: System, equations: Graph) -> LinearRows:
     """The rates (xi_dot, qdd) at a state moved by displacements xi from 0, which where velocities are rates are q."""
-    equations, kinematics, n = forward_dynamics(system), system.kinematics, system.n
+    kinematics, n = system.kinematics, system.n
     inputs, xi, rates = equations.inputs, system.q, system.qd
     nodes, none = list(equations.outputs.values())[:n], np.empty((0, 3 * n))  # without multipliers
     if kinematics.quasi is not None:
@@ -206,18 +228,24 @@ def linearize(
     [[0.0, 0.0, 1.714, -4.286], [0.0, 0.0, -4.286, 13.714], [-19.62, -4.905, 0.0, 0.0], [-4.905, -4.905, 0.0, 0.0]]
     """
     system, state = as_system(model), {"q": q, "qd": qd, "tau": tau}
-    found, size = linear_rows(system, require_choice("form", form, FORMS)), 3 * system.n
+    by_rows = None if system.body_terms is None else system.body_terms.linearized
+    if require_choice("form", form, FORMS) == FORMS[0] and by_rows is not None:
+        return by_rows(q, qd, 0.0 if tau is None else tau)
+    found, size = linear_rows(system, form), 3 * system.n
     x = input_rows(system, found.inputs, state, t, parameters)
     if x.ndim != 1:
         raise ValueError("linearize takes one state, got rows of several; see linearize_many")
     rows, graph, values = np.empty((2 * system.n, size)), found.graph, x.tolist()
-    if found.wrt:  # along all directions at once
+    if found.turned:  # by all weights at once
+        values += [*np.eye(len(found.wrt))]
+    elif found.wrt:  # along all directions at once
         graph = _slopes(found.graph, found.wrt)
         values += [*[0.0] * (len(found.graph.inputs) - len(values)), *np.eye(size)]
     entries = graph.evaluate(dict(zip(graph.input_names, values, strict=True))).values()
-    rows[len(found.above) :] = (
-        np.reshape([*entries], (-1, size)) if not found.wrt else [np.broadcast_to(each, size) for each in entries]
-    )
+    if found.wrt:
+        (rows.T if found.turned else rows)[:] = [np.broadcast_to(each, len(found.wrt)) for each in entries]
+    else:
+        rows[len(found.above) :] = np.reshape([*entries], (-1, size))
     a, b = matrices(rows, found)
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         _raise_what_is_not_finite(system, state, t, parameters)
@@ -239,8 +267,9 @@ def linearize_many(
     """`linearize` at N states, such as those of a horizon: machine code, made at the first call and kept.
 
     Of small systems, and of the momentum form, whose states are q and qd, too, it is `state_space`, all entries written
-    out. Of larger ones it is the Jacobian of the compiled `forward_dynamics`, colored, by displacements, velocities and
-    forces; it keeps the digits of long chains, too, whatever the condition of M. States lie side by side in vectors.
+    out. Of larger ones it is a colored Jacobian: of sums of rows by weights, or, with constraints or where a path from
+    the world to a tip has more than 32 coordinates, of `forward_dynamics` by displacements, velocities and forces; it
+    keeps the digits of long chains, too, whatever the condition of M. States lie side by side in vectors.
     The matrices of a state whose mass matrix is singular, or with a quaternion of length 0, have entries that are
     infinite or NaN.
 
@@ -278,7 +307,8 @@ def linearize_many(
     if found.wrt:
         x = np.hstack([values, np.zeros((len(values), function.n_in - len(found.inputs)))])
         x = x[0] if len(x) == 1 else x  # of one the columns fill vectors, not the states
-        rows = function.jacobian(x, wrt=found.wrt, threads=threads).reshape(-1, 2 * n, 3 * n)
+        rows = function.jacobian(x, wrt=found.wrt, threads=threads).reshape(-1, function.n_out, len(found.wrt))
+        rows = rows.swapaxes(1, 2) if found.turned else rows
     else:
         rows = np.empty((len(values), 2 * n, 3 * n))
         function.batch(values.T, threads, out=rows.reshape(-1, 6 * n * n)[:, found.above.size :].T)
@@ -294,3 +324,178 @@ def _raise_what_is_not_finite(
     if np.isfinite(info):
         raise_if_singular(system, info)
     raise ValueError("there is no linearization at this state: its numbers leave the range of float64")
+
+
+def row_sums(system: System, equations: Graph, weights: Sequence[Node]) -> list[Node]:
+    """Sums of d(xi_dot, qdd)/d(xi, qd, tau), 3n, without constraints: their slopes by the weights are (A B)^T.
+
+    With weights r of qdd, and torques of inverse dynamics:
+
+        w = M^-1 r = r . dqdd/dtau,   r . dqdd/dx = -d(w . torque)/dx at fixed w and qdd
+
+    The elimination that gives w gives the tangents of all velocity nodes along it, too, and the sweep takes these: sums
+    of w along a chain would lose digits that elimination keeps.
+
+    equations: forward dynamics.  weights: of the 2n rows.
+    """
+    n, kinematics, build = system.n, system.kinematics, Builder()
+    rates = folded(list(equations.outputs.values()), build)
+    by_q, by_qd, by_tau = _acceleration_sums(system, rates, weights[n:], build)
+    by_xi, columns = kinematics.pulled_back(by_q, build), zip(*kinematics.brackets(build), strict=True)
+    with building(build):  # xi_dot = dqd + C xi
+        by_xi = [bar + dot(column, weights[:n]) for bar, column in zip(by_xi, columns, strict=True)]
+        return [*by_xi, *[bar + weight for bar, weight in zip(by_qd, weights[:n], strict=True)], *by_tau]
+
+
+def _acceleration_sums(
+    system: System, rates: Sequence[Node], weights: Sequence[Node], build: Builder
+) -> tuple[list[Node], list[Node], list[Node]]:
+    """Sums of dqdd/dq, dqdd/dqd and dqdd/dtau.  rates: the accelerations."""
+    n, system = system.n, system.whole or system  # of numbers that keep most digits
+    terms, braking = bias_terms(system, system.qdd), system.braking(build)
+    given = (*terms.inertial, *terms.inertial.values(), *terms.gradient, *terms.forces)
+    lagrangian, *nodes = folded([terms.lagrangian, *given], build)
+    k, gradient, applied = len(terms.inertial), nodes[-2 * n : -n], nodes[-n:]
+    solved, w = solve_tangents(lagrangian, system.qd, weights, build), cg.variables([f"w{i}#" for i in range(n)])
+    along = tangents(dict(zip(system.qd, w, strict=True)), topological(nodes[:k]), build)
+    with building(build):
+        at_rest = [slope - brake + force for slope, brake, force in zip(gradient, braking, applied, strict=True)]
+        power = dot([along.get(z, ZERO) for z in nodes[:k]], nodes[k : 2 * k]) - dot(w, at_rest)  # w . torque
+        bars = cotangents({power: -ONE}, [*system.q, *system.qd], build)
+    known = {along[node]: solved[node] for node in along if node in solved}
+    slopes = folded(bars, build, known | dict(zip(system.qdd, rates, strict=True)))
+    return slopes[: system.nq], slopes[system.nq :], [solved[u] for u in system.qd]
+
+
+class ReducedLinearization(NamedTuple):
+    """The linear motion of a constrained system in displacements that are independent of one another.
+
+    Parameters
+    ----------
+    A : ndarray, (k, k)
+    B : ndarray, (k, n)
+        d(ydot) = A dy + B dtau.
+    states : tuple of str
+        What dy are, k names: "q.<velocity>" a displacement along this velocity, which is that of the coordinate unless
+        there are quasi-velocities; "qd.<velocity>" a change of it.
+    displacements : ndarray, (2n, k)
+        N of dx = N dy, x = (q, qd): all displacements that the constraints admit.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 4.5 * q[0] ** 2, ["x"])
+    >>> dyn.reduced_linearization(spring, [0.0], [0.0]).states
+    ('q.x', 'qd.x')
+    """
+
+    A: Array
+    B: Array
+    states: tuple[str, ...]
+    displacements: Array
+
+
+@documented
+def reduced_linearization(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike,
+    tau: ArrayLike | None = None,
+    *,
+    t: float = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> ReducedLinearization:
+    """`linearize` of a system with constraints, in as many displacements as it has freedoms.
+
+    Rows phi(q) = 0 and z(q, qd) = J qd + a = 0 admit the displacements dx = (xi, dqd) with
+
+        J_phi xi = 0,   (dz/dq) xi + J dqd = 0
+
+    Those dy of dx that the rest follow from, dx = N dy, are chosen at the state, by elimination. They are entries of
+    dx, and so d(ydot) = (A N) dy, these rows of it, is exact, also where the motion is none of rest. Nonholonomic rows
+    hold velocities alone: there are more displacements than velocities.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n velocities; without constraints N is 1.
+    q, qd : array_like, (nq,) and (n,)
+        Coordinates [rad or m] and velocities. A state that does not meet the constraints is moved onto them, with a
+        ConstraintWarning.
+
+    Returns
+    -------
+    ReducedLinearization
+        A, B, the names of the states, and N.
+
+    Raises
+    ------
+    ConstraintError
+        Where a constraint says nothing new at this state, so that its motions have no linear form.
+    ValueError
+        For arrays of another shape, a number that is not finite, or an unknown parameter.
+
+    Examples
+    --------
+    A mass on a rod of 2 m, in x and y, hangs at rest and swings with the square of the frequency 9.81 / 2:
+
+    >>> import dynamics as dyn
+    >>> def energy(q, qd, t):
+    ...     return 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1]
+    >>> rod = dyn.System(energy, "x y", constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 4.0})
+    >>> small = dyn.reduced_linearization(rod, [0.0, -2.0], [0.0, 0.0])
+    >>> small.A.round(12).tolist(), small.states
+    ([[0.0, 1.0], [-4.905, 0.0]], ('q.x', 'qd.x'))
+    """
+    system = as_system(model)
+    x = start_state(system, q, qd, parameter_values(system, parameters), t)
+    n, at = system.n, (x[: system.nq], x[system.nq :])
+    kept = independent_rows(system.constraints)
+    slopes = _row_slopes(system, kept, dict(zip(("q", "qd"), at, strict=True)), t, parameters)
+    holonomic = sum(k < len(system.constraints.positions) for k in kept)
+    following = _following(system, kept, slopes[:, n:])
+    a, b = linearize(model, *at, tau, t=t, parameters=parameters)
+    # J_phi xi = 0, then (dz/dq) xi + J dqd = 0
+    rows = np.vstack([np.hstack([slopes[:holonomic, n:], np.zeros((holonomic, n))]), slopes])
+    rows = rows / np.abs(rows).max(axis=1, keepdims=True, initial=0.0)
+    rest = [*following[:holonomic], *[n + j for j in following]]
+    chosen = [j for j in range(2 * n) if j not in rest]
+    # dx = N dy: entries that are chosen are dy, the rest follow from them
+    displacements = np.eye(2 * n)[:, chosen]
+    displacements[rest] = -np.linalg.solve(rows[:, rest], rows[:, chosen])
+    names = [f"{kind}.{name}" for kind in ("q", "qd") for name in system.velocities]
+    states = tuple([names[j] for j in chosen])
+    return ReducedLinearization((a @ displacements)[chosen], b[chosen], states, displacements)
+
+
+def _row_slopes(
+    system: System,
+    kept: tuple[int, ...],
+    state: Mapping[str, ArrayLike],
+    t: float,
+    parameters: Mapping[str, float] | None,
+) -> Array:
+    """dz/dx of these rows at a state, (m, 2n)."""
+    rates = [system.constraints.rates[k] for k in kept]
+    if not rates:
+        return np.zeros((0, 2 * system.n))
+    entries = [entry for row in state_slopes(system.kinematics, rates, Builder()) for entry in row]
+    graph = system.graph({str(k): entry for k, entry in enumerate(entries)}, system.q, system.qd)
+    return evaluate(system, graph, state, t, parameters).reshape(len(rates), -1)
+
+
+def _following(system: System, kept: tuple[int, ...], matrix: Array) -> list[int]:
+    """Velocities that follow from the others, one for each row in turn, by the largest entry of J, (m, n)."""
+    left, chosen = matrix, list[int]()
+    for axis in (0, 1) * 4:  # entries are made alike, and free of units (Ruiz)
+        size = np.abs(left).max(axis=axis, keepdims=True, initial=0.0)
+        left = left / np.sqrt(np.where(size > 0.0, size, 1.0))
+    for k, row in enumerate(left):
+        pivot = int(np.abs(row).argmax())
+        if not np.abs(row[pivot]) > DEPENDENT:
+            name = system.constraints.names[kept[k]]
+            raise ConstraintError(f"at this state constraint {name!r} says nothing that the others do not say")
+        chosen.append(pivot)
+        left[k + 1 :] -= np.outer(left[k + 1 :, pivot] / row[pivot], row)
+        left[k + 1 :, pivot] = 0.0
+    return chosen

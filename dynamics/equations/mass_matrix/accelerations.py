@@ -1,21 +1,27 @@
-"""Accelerations: M qdd = tau + forces - D qd - bias solved on the graph, by elimination or by a dense factorization."""
+"""Accelerations: M qdd = tau + forces - D qd - bias solved on the graph, by elimination or by a dense factorization.
+
+And solving with M for any number of right-hand sides by one factorization.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import Order, rounding_spread
-from cgraph.extend import Builder, SingularError, building, topological
+from cgraph.extend import OPS, Builder, SingularError, building, cotangents, folded, topological
 
 from ...systems.constraints import ConstraintError
+from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
 from ..bias_terms import BiasTerms, bias_terms
 from ..constraints.constraints import constraint_rows, multiplier_outputs, unknown_names
+from ..equation import mirrored
 from .singular_mass_matrix import TORQUE, SingularMassMatrixError, coordinate_sizes, no_inertia, require_inertia
 
 DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
@@ -25,16 +31,6 @@ TURN = 10  # products that a sine takes as long as, about
 DRAWN = 64  # states at which accelerations are looked at for their size
 LITTLE = 0.01  # of the torques by which bodies are accelerated as by their weight
 GROWTH = 3.0  # times the rounding of the safest graph, at most, at sample points
-
-
-def _require_inertia_without_constraints(system: System) -> None:
-    """A coordinate whose inertia is the constant zero may leave with a constraint; one that is rounding must not."""
-    free = system.without_constraints
-    try:
-        graph = cg.simplify(_solved(free, bias_terms(free), "recursive", check=False))
-    except SingularError:
-        return
-    require_inertia(free, graph)
 
 
 def accelerations(system: System, method: str = "auto", check: bool = False) -> Graph:
@@ -69,11 +65,17 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
     if not graphs:
         raise SingularMassMatrixError(no_inertia(system, failure)) from None
     chosen = _smallest(system, graphs, WORTH if methods[-1] == "dense" else 1.0)
-    if not system.surely_regular:
-        if constrained:
-            _require_inertia_without_constraints(system)
-        else:
-            require_inertia(system, chosen)
+    if system.surely_regular:
+        return chosen
+    free, graph = system, chosen
+    if constrained:
+        # a coordinate whose inertia is the constant zero may leave with a constraint; one that is rounding must not
+        free = system.without_constraints
+        try:
+            graph = cg.simplify(_solved(free, bias_terms(free), "recursive", check=False))
+        except SingularError:
+            return chosen
+    require_inertia(free, graph)
     return chosen
 
 
@@ -163,3 +165,95 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
     outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)
     outputs |= dict(zip(("info",), solved[end:], strict=False))
     return system.graph(outputs, system.q, system.qd, system.tau)
+
+
+DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization loses digits with about their fourth power
+SOLVE_WORTH = 0.8  # of the nodes by elimination, at most, for the dense one: elimination keeps more digits
+
+Rows = Sequence[Sequence[Node]]
+Solution = TypeVar("Solution")
+
+
+class MassSolve(NamedTuple):
+    """x with M x = b, of variables b: nodes linear in them.
+
+    column: the nodes that depend on b, arguments first, which every right-hand side takes once more.
+    """
+
+    b: list[Node]
+    x: list[Node]
+    column: list[Node]
+
+    def solutions(self, sides: Rows, build: Builder) -> list[list[Node]]:
+        """x of each of the right-hand sides."""
+        result = []
+        with building(build) as labelled:
+            for side in sides:
+                new = dict(zip(self.b, side, strict=True))
+                for node in self.column:
+                    labelled(node.label)
+                    new[node] = build(node.op, tuple([new.get(arg, arg) for arg in node.args]), node.label, node.name)
+                result.append([new.get(node, node) for node in self.x])
+        return result
+
+    def size(self, sides: int) -> int:
+        """Number of nodes of the solutions of so many right-hand sides, about."""
+        return len(topological(self.x)) + sides * len(self.column)
+
+
+def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
+    """Solution by elimination on the graph of L, "recursive", or by LDL^T of the matrix, "dense".
+
+    With constraints M x - J^T y = b, J x = b beyond n.  Raises SingularError for an M that is singular at every state.
+    """
+    lagrangian, *rates = folded([system.lagrangian, *system.constraints.rates], build)
+    rows = constraint_rows(system, rates)
+    b = cg.variables([f"b{i}#" for i in range(system.n + len(rows.kept))])
+    solve = rows.solve_densely if method == "dense" else rows.solve
+    return linear(b, solve(system, lagrangian, b, build)[: system.n])
+
+
+def smaller_solution(system: System, make: Callable[[str], Solution], size: Callable[[Solution], int]) -> Solution:
+    """Solution that `make` makes by elimination, or densely where paths are short and that saves nodes."""
+    eliminated = make("recursive")
+    if longest_path(system.lagrangian, system.qd) > DENSE_PATH:
+        return eliminated
+    with suppress(SingularError, SingularMassMatrixError):  # which needs rows exchanged
+        if size(dense := make("dense")) < SOLVE_WORTH * size(eliminated):
+            return dense
+    return eliminated
+
+
+def inverse(solve: MassSolve, build: Builder) -> list[list[Node]]:
+    """Rows of M^-1: of the symmetric entries those with fewer operations, where the column is of a later coordinate."""
+    return mirrored(solve.solutions(units(len(solve.x), len(solve.b)), build))
+
+
+def units(count: int, length: int) -> list[list[Node]]:
+    """The first unit vectors of this length."""
+    return [[ONE if i == j else ZERO for i in range(length)] for j in range(count)]
+
+
+def longest_path(lagrangian: Node, velocities: Sequence[Node]) -> int:
+    """The most velocities that come before one and move with it, itself among them: entries in a lower row of M."""
+    momenta = cotangents({lagrangian: ONE}, velocities)
+    moving = [set(topological([p])) for p in momenta]
+    return max([sum([u in moving[i] for u in velocities[: i + 1]]) for i in range(len(velocities))])
+
+
+def linear(b: list[Node], x: list[Node]) -> MassSolve:
+    """Solution of nodes x that are linear in b; a divisor of a column multiplies it, once inverted for all."""
+    moving, column = set(b), []
+    new: dict[Node, Node] = {}
+    inverses: dict[Node, Node] = {}
+    for node in topological(x):
+        if not any([arg in moving for arg in node.args]):
+            continue
+        moving.add(node)
+        args, op = tuple([new.get(arg, arg) for arg in node.args]), node.op
+        if op is OPS["div"]:  # of numbers that are linear in b, by one that is not
+            inverse = inverses.setdefault(args[1], Node(op, (ONE, args[1]), node.label))
+            args, op = (args[0], inverse), OPS["mul"]
+        new[node] = Node(op, args, node.label)
+        column.append(new[node])
+    return MassSolve(b, [new.get(node, node) for node in x], column)

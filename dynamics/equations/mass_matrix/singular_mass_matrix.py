@@ -12,11 +12,11 @@ from cgraph import Graph, Node, extend
 from cgraph._shared import Array, real_array
 from cgraph.extend import SingularError, solve_nodes, topological
 
+from ...systems.kinematics import substitute
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraints import unknown_names
 from ..equation import entries, mirrored
-from ..substitute import substitute
 
 STATES = 3
 TORQUE = 2.0**200  # so large that no other force counts

@@ -14,9 +14,8 @@ from ...systems.energies import signed_terms, split_by_motion
 from ...systems.kinematics import ONE, ZERO, dot
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..energies import energy
 from ..equation import called, documented, entries
-from ..equations_of_motion import momentum
+from ..equations_of_motion import energy, momentum
 from .hamiltonian import momentum_slopes
 
 ENERGY, JACOBI = "energy", "Jacobi's integral"

@@ -17,8 +17,7 @@ from cgraph._shared import Array, kept_by_first, real_array, require_kind
 from ...systems.arguments import TIME, finite_time
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..constraints.constraint_rank import ConstraintWarning
-from ..constraints.nearly_redundant_rows import lost_rank
+from ..constraints.constraint_rank import ConstraintWarning, lost_rank
 from ..equation import documented
 from .initial_value import parameter_values
 

@@ -12,7 +12,7 @@ from cgraph._shared import Array, or_nearest, real_array
 
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model
-from ..constraints.projection import projected_start
+from ..constraints.constraints import projected_start
 from ..constraints.row_numbers import in_python
 from ..state_equation import normalization, state_inputs
 

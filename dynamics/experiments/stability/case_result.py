@@ -46,13 +46,8 @@ class CaseResult:
         return not self.stopped and all([each.meets for each in self.measurements])
 
     @property
-    def explained(self) -> bool:
-        """Whether the case meets its bounds or has a reason why not."""
-        return self.meets or bool(self.reason)
-
-    @property
     def verdict(self) -> str:
-        """Verdict in a word."""
+        """Verdict in a word; a limit is a case that has a reason why it does not meet its bounds."""
         return "meets" if self.meets else "limit" if self.reason else "unexplained"
 
     def to_dict(self) -> dict[str, Any]:

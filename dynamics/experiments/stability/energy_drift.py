@@ -8,11 +8,11 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ...multibody.builders.planar_arm import planar_arm
+from ...multibody.builders import planar_arm
 from ...scenes import Scene
 from ...simulation.simulate import simulate
 from .case_result import CaseResult, Measurement, reason
-from .cases.orbits import kepler
+from .cases.rotation import kepler
 
 STEPS, QUICK = 10**6, 10**5
 BLOCKS = 16  # whose means are taken as independent; their residuals show how far they are that

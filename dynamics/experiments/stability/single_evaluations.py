@@ -24,10 +24,9 @@ from cgraph._shared import Array
 
 from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations.formulations import inverse_dynamics
-from ...multibody.builders.planar_arm import PlanarLink, planar_arm, planar_links
+from ...multibody.builders import PlanarLink, planar_arm, planar_links
 from ...multibody.trees.mechanism import Mechanism
-from ...multiprecision.decimal_numbers import working
-from ...multiprecision.graph_values import values_in_digits
+from ...multiprecision.decimal_numbers import values_in_digits, working
 from ...systems.system import System
 from .case_result import CaseResult, Measurement, reason
 

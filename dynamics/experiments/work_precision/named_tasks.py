@@ -11,19 +11,14 @@ from ... import scenes
 from ...scenes.start import Start, moving_start, rest_text, with_start
 from ..accuracy_task import AccuracyTask
 from ..stability import cases
-from ..stability.cases.orbits import kepler
+from ..stability.cases.rotation import kepler
 
-TASKS: dict[str, Callable[[], AccuracyTask]] = {
+TASKS: dict[str, Callable[[], AccuracyTask]] = {  # beside the scenes, the cases and the files
     **{f"kepler {e:g}": partial(kepler, e, 3.5, 1.0) for e in (0.3, 0.5, 0.7, 0.9)},
     "spring pendulum 1e8": partial(cases.load, "damped spring pendulum, k = 1e+08"),
     "van der pol 1e6": partial(cases.load, "Van der Pol, mu = 1e+06"),
     "robertson": partial(cases.load, "Robertson, to 1e11"),
 }
-
-
-def names() -> list[str]:
-    """Names of the tasks beside the scenes, the cases and the files."""
-    return list(TASKS)
 
 
 def load(

@@ -13,9 +13,8 @@ from ...integrators import METHODS, Problem
 from ..accuracy_task import AccuracyTask
 from ..text_table import check_names, csv_text
 from ..timing import exponent, load as load_of_machine, machine, spent
-from .measurement import FLOOR_ERROR, Entry, ErrorMetrics, Tried, sweep, time_in_turns
+from .measurement import EQUAL, FLOOR_ERROR, Entry, ErrorMetrics, Ours, Tried, problem_of, sweep, time_in_turns
 from .named_tasks import load
-from .trajectory_runs import EQUAL, Ours, problem_of
 
 LIMIT = 0.3  # s; no finer knob is tried after a run of this length
 
@@ -85,28 +84,18 @@ class WorkPrecision:
 
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain data for JSON; None in place of what is no number."""
-        plain: dict[str, Any] = _plain(asdict(self) | {"targets": [asdict(each) for each in targets(self.curves)]})
+        plain: dict[str, Any] = _plain(asdict(self) | {"targets": targets(self.curves)})
         return plain
 
 
-@dataclass(frozen=True)
-class Target:
-    """The fastest run with at most this error at t_end."""
-
-    error: float
-    name: str
-    knob: float
-    seconds: float
-
-
-def targets(curves: Sequence[Curve]) -> list[Target]:
-    """Targets for each error that is met."""
+def targets(curves: Sequence[Curve]) -> list[dict[str, Any]]:
+    """The fastest run with at most an error at t_end, for each of `TARGETS` that is met."""
     fastest_runs = []
     for error in TARGETS:
         met = [(curve.name, point) for curve in curves for point in curve.points if point.error <= error]
         if met:
             name, point = min(met, key=lambda each: each[1].seconds)
-            fastest_runs.append(Target(error, name, point.knob, point.seconds))
+            fastest_runs.append({"error": error, "name": name, "knob": point.knob, "seconds": point.seconds})
     return fastest_runs
 
 
@@ -217,7 +206,7 @@ def work_precision(
     entries: list[Entry[Ours]] = []
     for solver in [Ours(method, task, metrics.smallest, problem) for method in METHODS if method in methods]:
         say(f"{name}: {solver.name}")
-        entry = sweep(solver, metrics, limit)
+        entry = sweep(solver, metrics.at_end, limit)
         if entry.tried:
             entries.append(entry)
         else:

@@ -3,8 +3,10 @@
 An array may be one of objects: floats, and nodes where there are parameters. Rotations are floats alone.
 """
 
+import math
 from collections.abc import Sequence
 from functools import reduce
+from itertools import chain, permutations, product as cartesian
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,21 +20,25 @@ from ...systems.kinematics import ZERO as ZERO, dot as dot  # noqa: PLC0414 (of 
 Triple = tuple[Node, Node, Node]
 Matrix = Sequence[Sequence[float | Node]]  # (3, 3)
 STILL: Triple = (ZERO, ZERO, ZERO)
+UNITS = frozenset((0.0, 1.0, -1.0))  # the entries of quarter turns
+_MIRRORED = [np.diag(signs) for signs in cartesian((1.0, -1.0), repeat=3)]
+QUARTER_TURNS = {tuple(each[[*rows]].ravel().tolist()) for each in _MIRRORED for rows in permutations(range(3))}
+UNTURNED = np.eye(3).tolist()
 SNAP = 1e-14  # of length 1: a component of a rotation that is no more comes from a quarter turn, or one in text
 SUM_ROUNDING = 2.0**-48  # of the terms of a sum: what is left is their rounding if it is no more
 
 
 def rotation(axis: Array, angle: float) -> Array:
     """The matrix, (3, 3), that turns by `angle` [rad] about the unit vector `axis` (Rodrigues)."""
-    x, y, z = axis
+    x, y, z = axis.tolist()
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return snapped(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross))
 
 
 def unit(vector: Array) -> Array:
     """The vector, which is not zero, at length 1."""
-    vector = np.ldexp(vector, -int(np.frexp(np.abs(vector).max())[1]))  # else squares of small numbers vanish
-    result: Array = vector / np.linalg.norm(vector)
+    vector = np.ldexp(vector, -math.frexp(max(map(abs, vector.tolist())))[1])  # else squares of small numbers vanish
+    result: Array = vector / math.sqrt(vector @ vector)
     return result
 
 
@@ -41,12 +47,19 @@ def snapped(columns: Array) -> Array:
 
     So a component near 1 stays where the others say that it is the cosine of a small angle.
     """
-    if (columns == np.rint(columns)).all():
-        return columns + 0.0
-    result = np.where(np.abs(columns) <= SNAP, 0.0, columns)
-    along = np.abs(result) > 0.9  # one component of a column at most
-    across = np.sum(np.where(along, 0.0, result) ** 2, axis=0)
-    return np.where(along & (across <= 2.0**-53), np.sign(result), result) + 0.0
+    known = columns.T.tolist()
+    if UNITS.issuperset(known if columns.ndim == 1 else chain(*known)):
+        return np.add(columns, 0.0, dtype=np.float64)
+    result = np.empty_like(columns, dtype=np.float64)
+    result.T[...] = _snapped(known) if columns.ndim == 1 else [_snapped(column) for column in known]
+    return result
+
+
+def _snapped(column: list[float]) -> list[float]:
+    kept = [0.0 if abs(x) <= SNAP else x + 0.0 for x in column]
+    if not sum([x * x for x in kept if not abs(x) > 0.9]) <= 2.0**-53:  # one component of a column is above, at most
+        return kept
+    return [math.copysign(1.0, x) if abs(x) > 0.9 else x for x in kept]
 
 
 def cleaned(array: Array) -> Array:
@@ -84,11 +97,19 @@ def _sizes(array: Array) -> Array:
 
 def added(a: Array, b: Array) -> Array:
     """a + b, where they cancel zero."""
-    return without_rounding(a + b, _sizes(a) + _sizes(b))
+    if a.dtype == object or b.dtype == object:
+        return without_rounding(a + b, _sizes(a) + _sizes(b))
+    pairs = zip(a.ravel().tolist(), b.ravel().tolist(), strict=True)
+    sums = [0.0 if abs(total := x + y) <= SUM_ROUNDING * (abs(x) + abs(y)) else total for x, y in pairs]
+    return np.array(sums, dtype=np.float64).reshape(a.shape)
 
 
 def product(*factors: Array) -> Array:
     """The matrix product, with entries whose terms cancel zero."""
+    if not any([each.dtype == object for each in factors]):
+        turned = [each for each in factors if each.tolist() != UNTURNED] or factors[:1]
+        if sum([tuple(each.ravel().tolist()) not in QUARTER_TURNS for each in turned[len(turned) == 1 :]]) <= 1:
+            return np.add(reduce(np.matmul, turned), 0.0, order="C")  # type: ignore[no-any-return]
     return without_rounding(reduce(np.matmul, factors), reduce(np.matmul, [_sizes(each) for each in factors]))
 
 
@@ -130,15 +151,18 @@ def to_quaternion(matrix: Array) -> Array:
 
 def to_z(axis: Array) -> Array:
     """A rotation whose third column is the unit vector `axis`: the nearest turn of the coordinate axes."""
-    seed = np.eye(3)[int(np.abs(axis).argmin())]
-    x = seed - (seed @ axis) * axis
-    x /= np.linalg.norm(x)
-    return snapped(np.column_stack([x, np.cross(axis, x), axis]))
+    a, b, c = known = axis.tolist()
+    least = [abs(each) for each in known].index(min(abs(a), abs(b), abs(c)))
+    across = np.array([(i == least) - known[least] * each for i, each in enumerate(known)])
+    x, y, z = (across / math.sqrt(across @ across)).tolist() if known[least] else across.tolist()
+    return snapped(np.array([[x, b * z - c * y, a], [y, c * x - a * z, b], [z, a * y - b * x, c]]))
 
 
 def parallel_axis(inertia: Array, mass: float | Node, offset: Array) -> Array:
     """Inertia about a point `offset` away from the center of mass (parallel axes)."""
-    x, y, z = offset
+    x, y, z = offset.tolist()
+    if type(mass) is float and inertia.dtype == offset.dtype != object and x == y == z == 0.0:
+        return inertia + 0.0
     return added(inertia, mass * np.array([[y * y + z * z, -x * y, -x * z],
                                            [-x * y, x * x + z * z, -y * z],
                                            [-x * z, -y * z, x * x + y * y]]))  # fmt: skip

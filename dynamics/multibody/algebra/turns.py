@@ -83,11 +83,7 @@ class MatrixTurn(NamedTuple):
 
     rows: Matrix
     angle: None = None  # about more than one axis
-
-    @property
-    def still(self) -> bool:
-        """False: it is about any axis."""
-        return False
+    still: bool = False
 
     @property
     def reversed(self) -> MatrixTurn:

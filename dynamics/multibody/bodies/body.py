@@ -1,11 +1,11 @@
-"""Bodies and the joints that carry them, checked."""
+"""Bodies, the joints that carry them and their limits, checked."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any
 
@@ -13,15 +13,66 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph._shared import Array, check_name, is_finite, nearest, or_nearest
+from cgraph._shared import Array, check_name, is_finite, kept_by_first, nearest, or_nearest, real_array
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS, TYPES, JointType
-from ..joints.consistency import contradiction
+from ..joints.joint_type import contradiction
 from ..parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
-from .limits import NO_LIMITS, Limits
+
+Pair = tuple[float, float]
+ANYTHING: Pair = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of one coordinate, as numbers for whoever asks: bounds of an optimization, ends of a slider.
+
+    Nothing in the equations changes with them: a spring that holds a joint is a `JointLimit`, a motor that saturates an
+    `Actuator`.
+
+    Parameters
+    ----------
+    position : pair of floats
+        Lower and upper end [rad or m]; infinite where there is none, as in the next two.
+    velocity : pair of floats
+        [rad/s or m/s]
+    effort : pair of floats
+        Of the force or torque that acts along the joint [N or N m].
+
+    Raises
+    ------
+    TypeError, ValueError
+        For what are no numbers, NaN, and a lower end above the upper.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> elbow = dyn.Joint("revolute", (0.0, 1.0, 0.0), limits=dyn.Limits((-0.5, 2.0), velocity=(-3.0, 3.0)))
+    >>> arm = dyn.Mechanism([dyn.Body("elbow", elbow, mass=1.0, center=(0.0, 0.0, -0.5))])
+    >>> arm.limits["elbow"]
+    Limits(position=(-0.5, 2.0), velocity=(-3.0, 3.0), effort=(-inf, inf))
+    """
+
+    position: Pair = ANYTHING
+    velocity: Pair = ANYTHING
+    effort: Pair = ANYTHING
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            given = getattr(self, each.name)
+            ends = real_array(f"limits: {each.name}", given)
+            if ends.shape != (2,) or not ends[0] <= ends[1]:
+                raise ValueError(f"limits: {each.name} must be (lower, upper), got {given!r:.60}")
+            object.__setattr__(self, each.name, (float(ends[0]), float(ends[1])))
+
+
+NO_LIMITS = Limits()
+
 
 WORLD = "world"
+PLAIN = (float, type(None))
+NUMBERS = frozenset((float, int))
 TEXT_ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
 
 
@@ -113,12 +164,11 @@ class Joint:
     limits: Any = None  # Limits, or of a composed joint one for each coordinate
 
     def __post_init__(self) -> None:
-        kinds = [*TYPES, *COMPOSITIONS]
-        if not isinstance(self.kind, str) or self.kind not in kinds:
-            raise MechanismError(f"a joint must be one of {', '.join(kinds)}, got {self.kind!r:.60}")
+        if not isinstance(self.kind, str) or (self.kind not in TYPES and self.kind not in COMPOSITIONS):
+            raise MechanismError(f"a joint must be one of {', '.join([*TYPES, *COMPOSITIONS])}, got {self.kind!r:.60}")
         for name in ("damping", "stiffness", "spring_reference", "armature", "limits"):
             value = getattr(self, name)
-            if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
+            if type(value) not in PLAIN and isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
                 object.__setattr__(self, name, tuple(value))
 
     @property
@@ -196,7 +246,7 @@ def vector(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
-    if array.shape != shape or not np.isfinite(array).all():
+    if array.shape != shape or not all(map(math.isfinite, array.ravel().tolist())):
         given = value.tolist() if isinstance(value, np.ndarray) else value
         raise MechanismError(f"{what} must be {shape} finite numbers, got {given!r:.80}")
     return array
@@ -205,7 +255,11 @@ def vector(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array:
 def checked_rotation(what: str, value: object) -> Array:
     """The value as a rotation, (3, 3). Raises MechanismError, naming `what`, unless it is one."""
     matrix = vector(what, value, (3, 3))
-    if np.abs(matrix.T @ matrix - np.eye(3)).max() > TEXT_ROUNDING or np.linalg.det(matrix) < 0:
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    lengths = (a * a + d * d + g * g - 1.0, b * b + e * e + h * h - 1.0, c * c + f * f + i * i - 1.0)
+    across = (a * b + d * e + g * h, b * c + e * f + h * i, a * c + d * f + g * i)
+    determinant = a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g)
+    if determinant < 0 or max(map(abs, lengths + across)) > TEXT_ROUNDING:
         raise MechanismError(f"{what} must be a rotation matrix")
     return matrix
 
@@ -220,8 +274,10 @@ def shape_of(value: Any) -> tuple[int, ...]:
 
 def quantities(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array:
     """Array of floats as `vector` gives it, or of floats and nodes, as objects, where there are parameters."""
+    if type(value) is tuple and NUMBERS.issuperset(map(type, value)):
+        return vector(what, value, shape)
     known = entries(value)
-    if not any([isinstance(each, str | Node) for each in known]):
+    if not any([isinstance(each, str | Node) for each in known if type(each) is not float]):
         return vector(what, value, shape)
     if np.shape(np.asarray(value, dtype=object)) != shape:
         raise MechanismError(f"{what} must be {shape} finite numbers, got {value!r:.80}")
@@ -232,6 +288,8 @@ def quantities(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array
 
 def quantity(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float | Node:
     """The number, or the node of a parameter."""
+    if type(value) is float and math.isfinite(value) and value >= minimum:
+        return value
     if isinstance(value, Node) and not names_in([value]):
         value = evaluated(value, {}).item()
     if isinstance(value, str | Node):
@@ -256,25 +314,29 @@ def checked(body: Body) -> Body:
     if not isinstance(body.parent, str):
         raise MechanismError(f"{where}: parent must be the name of a body or {WORLD!r}, got {body.parent!r:.80}")
     mass, center = quantity(f"{where}: mass", body.mass, " kg"), quantities(f"{where}: center", body.center)
-    with np.errstate(over="ignore"):
-        beside = 0.0 if isinstance(mass, Node) or center.dtype == object else mass * float(center @ center)
+    beside = 0.0 if isinstance(mass, Node) or center.dtype == object else mass * sum([x * x for x in center.tolist()])
     inertia = _inertia(f"{where}: inertia", body.inertia, beside)
     share = BODY_QUANTITIES["gravity_compensation"](f"{where}: gravity_compensation", body.gravity_compensation)
-    joint = _checked_joint(where, joint)
+    if not isinstance(joint, Joint):
+        raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
+    joint = checked_joint(joint, where)
     return replace(body, mass=mass, center=center, inertia=inertia, gravity_compensation=share, joint=joint)
 
 
 def unit_axis(what: str, value: object) -> Array:
     """The value at length 1. Raises MechanismError, naming `what`, unless it is three finite numbers and not zero."""
     axis = vector(what, value)
-    if not axis.any():
+    known = axis.tolist()
+    if known.count(0.0) == 2:  # along x, y or z
+        return np.array([math.copysign(1.0, x) if x else 0.0 for x in known])
+    if not any(known):
         raise MechanismError(f"{what} must not be zero")
     return spatial.snapped(spatial.unit(axis))
 
 
-def _checked_joint(where: str, joint: Joint) -> Joint:
-    if not isinstance(joint, Joint):
-        raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
+@kept_by_first
+def checked_joint(joint: Joint, where: str) -> Joint:
+    """The joint likewise."""
     if not isinstance(joint.name, str) or joint.name:
         checked_name(f"the joint of {where}", joint.name)
     axis = unit_axis(f"{where}: axis", joint.axis)
@@ -326,7 +388,9 @@ def body_name(bodies: Sequence[Body], given: str, what: str = "") -> str:
     """
     if not isinstance(given, str):
         raise MechanismError(f"a body is named by a string, got {type(given).__name__}: {given!r:.60}")
-    known = {body.coordinate: body.name for body in bodies} | {body.name: body.name for body in bodies}
+    if given in (names := [body.name for body in bodies]):
+        return given
+    known = {body.coordinate: body.name for body in bodies} | {name: name for name in names}
     if given not in known:
         raise unknown_body(f"there is no body {given!r:.80} {what}in the mechanism", given, known)
     return known[given]
@@ -348,23 +412,26 @@ def _inertia(what: str, given: object, beside: float = 0.0) -> Array:
     """
     diagonal = shape_of(given) == (3,)
     inertia = quantities(what, given, (3,) if diagonal else (3, 3))
-    inertia = np.where(np.eye(3, dtype=bool), inertia, 0.0) if diagonal else inertia
+    if diagonal:
+        a, b, c = inertia.tolist()
+        inertia = np.array([[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]], dtype=inertia.dtype)
     if inertia.dtype == object:
         return inertia
-    scale = float(np.abs(inertia).max())
+    (a, b, c), (d, e, f), (g, h, i) = inertia.tolist()
+    scale = max(map(abs, (a, b, c, d, e, f, g, h, i)))
     if not math.isfinite(3.0 * scale + beside):
         given = f"{scale:g} kg m^2 about its center and {beside:g} kg m^2 by that of its mass"
         raise MechanismError(f"{what} about the joint is beyond float64, with {given}")
-    if np.abs(inertia - inertia.T).max() > TEXT_ROUNDING * scale:
+    if max(abs(b - d), abs(c - g), abs(f - h)) > TEXT_ROUNDING * scale:
         raise MechanismError(f"{what} must be symmetric")
-    moments = np.linalg.eigvalsh(inertia)
+    moments = np.linalg.eigvalsh(inertia).tolist() if any((b, c, d, f, g, h)) else sorted((a, e, i))
     rounding = moment_rounding(scale, beside)
     if moments[0] < -rounding:
-        raise MechanismError(f"{what} must not be negative, its principal moments are {moments.tolist()}")
+        raise MechanismError(f"{what} must not be negative, its principal moments are {moments}")
     if moments[2] > moments[0] + moments[1] + rounding:
-        text = f"no body has principal moments {moments.tolist()}: the largest exceeds the sum of the others"
+        text = f"no body has principal moments {moments}: the largest exceeds the sum of the others"
         warnings.warn(f"{what.removesuffix(': inertia')}: {text}", MechanismWarning, stacklevel=2)
-    return 0.5 * (inertia + inertia.T)
+    return inertia if diagonal else 0.5 * (inertia + inertia.T)
 
 
 def moment_rounding(scale: float, beside: float) -> float:

@@ -12,7 +12,7 @@ from cgraph._shared import Array, is_finite, require_mapping
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS
-from ..joints.composition import AXIS
+from ..joints.axial import AXIS
 from .body import (
     JOINT_QUANTITIES,
     TEXT_ROUNDING,

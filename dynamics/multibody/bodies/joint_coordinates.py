@@ -11,11 +11,10 @@ import cgraph as cg
 from cgraph import Node
 from cgraph._shared import Array
 
-from ...systems.quasi_velocities import QuasiVelocities
+from ...systems.kinematics import QuasiVelocities
 from ..joints import JointType
 from ..parameters import Quantities
-from .body import WORLD, Body
-from .limits import NO_LIMITS, Limits
+from .body import NO_LIMITS, WORLD, Body, Limits
 
 Value = TypeVar("Value")
 _FORCES = {"rad/s": "N m", "m/s": "N"}

@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,8 +22,7 @@ from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
 from ..parameters import Quantity, symbol
 from ..sweeps.kinematic_chain import KinematicChain
-from .contact import Contact, check_contact, touch
-from .external_force import FORCE, Force, HasParameters, check_force, powers
+from .contact import FORCE, Contact, Force, HasParameters, check_contact, check_force, powers, touch
 
 Range = tuple[float, float]
 
@@ -213,13 +212,10 @@ class JointFriction(JointForce):
     (array([0.25]), array([0.]))
     """
 
+    quantities: ClassVar = {"loss": quantity}
+
     loss: Quantity
     velocity: float = 0.0
-
-    @property
-    def quantities(self) -> Mapping[str, Callable[[str, object], object]]:
-        """The loss."""
-        return {"loss": quantity}
 
     def check(self, body: Body) -> None:
         """Raises MechanismError for numbers out of range."""

@@ -23,16 +23,14 @@ from ...equations.formulations.lagrange_terms import (
     lagrange_sweeps,
     through_step,
 )
-from ...equations.torque_parts.torque_decomposition import names_of_partials
-from ...equations.torque_parts.torque_table import TorqueTable
+from ...equations.torque_parts.torque_table import TorqueTable, names_of_partials
 from ...systems.arguments import new_variables
 from ...systems.energies import signed_terms
 from ...systems.kinematics import ONE, ZERO, changes
 from ...systems.model import Model, as_system, display_names
 from ...systems.system import System
-from ..changes.switched_effects import without_effect
-from ..forces.contact import Contact
-from ..forces.external_force import Force
+from ..changes.pruning import without_effect
+from ..forces.contact import Contact, Force
 from ..forces.joint_force import JointForce, generalized_forces
 from ..trees.mechanism import Mechanism, as_mechanism
 

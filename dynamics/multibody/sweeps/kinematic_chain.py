@@ -16,7 +16,7 @@ from ..algebra.spatial import STILL, Triple, plus
 from ..algebra.turns import in_a_row
 from ..bodies.body import WORLD, Body
 from .kinematic_tree import Carrier
-from .links import LinkState, axes_of
+from .links import LinkState, motion_axes
 
 
 class PointMotion(NamedTuple):
@@ -133,7 +133,7 @@ def kinematic_chains(
             path.append(moving[index[path[-1]]].parent)
     common = next(name for name in paths[0] if all([name in path for path in paths]))
     needed = {common, *[carrier.name for carrier in carriers]}
-    axes = {name: np.eye(3) if name == WORLD else axes_of(moving[index[name]]) for name in needed}
+    axes = {name: np.eye(3) if name == WORLD else motion_axes(moving[index[name]].joint) for name in needed}
     result = []
     for carrier, path in zip(carriers, paths, strict=True):
         steps = tuple([states[index[name]] for name in path[: path.index(common)]])

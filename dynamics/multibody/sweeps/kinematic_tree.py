@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from cgraph.extend import Builder, building
 from ..algebra import spatial
 from ..bodies.body import WORLD, Body, Joint, MechanismError, vector
 from ..parameters import entries, names_in, vanishes
-from .links import MergedBody, axes_of, inertia_in
+from .links import MergedBody, inertia_in
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,22 @@ class Carrier:
     orientation: Array  # (3, 3)
 
 
+class Place(NamedTuple):
+    """Place of a body in a tree.  at: where its joint is locked, if it is.  part: the body, on a weld if it is locked.
+
+    onto: the moving body that it is welded to, if any.  moving: the body that moves, with all merged up to this one.
+    """
+
+    at: tuple[float, ...]
+    parent: Carrier
+    onto: Body | None
+    part: Body
+    carrier: Carrier
+    moving: Body | None
+
+
 _OWN = (np.zeros(3), np.eye(3))
+GROUND = Carrier(WORLD, *_OWN)
 
 
 def parents_first(bodies: Sequence[Body]) -> list[Body]:
@@ -50,65 +65,73 @@ def parents_first(bodies: Sequence[Body]) -> list[Body]:
     return order
 
 
-def lock_joints(bodies: Sequence[Body], at: Mapping[str, float | ArrayLike]) -> list[Body]:
-    """The bodies, with the joints named in `at` welded where they stand at that coordinate [rad or m], or at several.
+def locked_at(body: Body, value: Any) -> tuple[float, ...]:
+    """Coordinates of a body's joint. Raises MechanismError unless it is a finite number, or as many as it has.
 
-    Raises MechanismError for a body that has no joint to lock, and a coordinate that is not finite.
-    """
-    by_name = {body.name: body for body in bodies}
-    welds: dict[str, Joint] = {}
-    for name, value in at.items():
-        joint = by_name[name].joint
-        if not joint.type.moves:
-            raise MechanismError(f"body {name!r} is welded on and has no joint to lock")
-        orientation, axis, position = (np.asarray(each) for each in (joint.orientation, joint.axis, joint.position))
-        turn, shift = joint.type.placement(axis, locked_at(by_name[name], value))
-        place = spatial.placed(position, orientation, shift)
-        welds[name] = Joint("fixed", position=place, orientation=spatial.snapped(orientation @ turn))
-    return [replace(body, joint=welds[body.name]) if body.name in welds else body for body in bodies]
-
-
-def locked_at(body: Body, value: Any) -> Array:
-    """Coordinates of a body's joint, (nq,). Raises MechanismError unless it is a finite number, or as many as it has.
-
-    A quaternion needs a length; only its direction counts.
+    Also for a body that has no joint to lock. A quaternion needs a length; only its direction counts.
     """
     where, count = f"joint of body {body.name!r}", len(body.joint.type.coordinates)
+    if not body.joint.type.moves:
+        raise MechanismError(f"body {body.name!r} is welded on and has no joint to lock")
     if count == 1:
         if not is_finite(value):
             raise MechanismError(f"{where}: it can be locked at a finite number, got {value!r:.80}")
-        return np.array([float(value)])
+        return (float(value),)
     at = vector(f"{where}: the coordinates where it is locked", value, (count,))
     groups = np.array(body.joint.type.groups)
     for group in {*groups.tolist()}:  # the entries of a quaternion are one
         if (groups == group).sum() > 1 and not np.any(at[groups == group]):
             raise MechanismError(f"{where}: a quaternion must not be zero, got {value!r:.80}")
-    return at
+    return tuple(at.tolist())
 
 
-def merge_fixed_bodies(bodies: Sequence[Body]) -> tuple[list[Body], dict[str, Carrier]]:
-    """The bodies that move and what carries each body of all: a welded body's mass and children are its carrier's."""
+def placed_bodies(
+    bodies: Sequence[Body], at: Mapping[str, float | ArrayLike], before: Mapping[Body, Place]
+) -> tuple[dict[Body, Place], tuple[Body, ...]]:
+    """The places of bodies, parents first, and those that move: a welded body's mass and children are its carrier's.
+
+    at: the coordinates [rad or m] of joints that are locked.  before: places, taken where a body hangs on the same.
+    Raises MechanismError as `locked_at` and `parents_first`.
+    """
+    by_name = {body.name: body for body in bodies}
+    locked = {name: locked_at(by_name[name], value) for name, value in at.items()}
+    places: dict[Body, Place] = {}
+    carriers = {WORLD: GROUND}
+    merged: dict[str, Body | None] = {}
     with building(Builder()), np.errstate(all="ignore"):  # `require_inertia` says what is beyond float64
-        carriers = {WORLD: Carrier(WORLD, *_OWN)}
-        merged: dict[str, Body] = {}
-        for body in bodies:
-            parent = carriers[body.parent]
-            position = spatial.placed(parent.position, parent.orientation, np.asarray(body.joint.position))
-            orientation = spatial.snapped(parent.orientation @ np.asarray(body.joint.orientation))
-            if body.joint.type.moves:
-                carriers[body.name] = Carrier(body.name, *_OWN)
-                merged[body.name] = body
-                if parent.name != body.parent:
-                    joint = replace(body.joint, position=position, orientation=orientation)
-                    merged[body.name] = replace(body, parent=parent.name, joint=joint)
-                continue
-            carriers[body.name] = Carrier(parent.name, position, orientation)
-            if parent.name != WORLD and not (vanishes(body.mass) and vanishes(body.inertia)):
-                center = spatial.placed(position, orientation, np.asarray(body.center))
-                inertia = spatial.product(orientation, np.asarray(body.inertia), orientation.T)
-                other = replace(body, center=center, inertia=inertia)
-                merged[parent.name] = _joined(merged[parent.name], other)
-        return list(merged.values()), carriers
+        for body in parents_first(bodies):
+            parent, still = carriers[body.parent], locked.get(body.name, ())
+            onto = None if body.joint.type.moves and not still else merged.get(parent.name)
+            found = before.get(body)
+            if found is None or found.parent is not parent or found.onto is not onto or found.at != still:
+                found = _place(body, still, parent, onto, found)
+            places[body], carriers[body.name], merged[found.carrier.name] = found, found.carrier, found.moving
+    return places, tuple([body for body in merged.values() if body])
+
+
+def _place(body: Body, at: tuple[float, ...], parent: Carrier, onto: Body | None, before: Place | None) -> Place:
+    joint = body.joint
+    if at:
+        turn, shift = joint.type.placement(np.asarray(joint.axis), np.array(at))
+        position, orientation = np.asarray(joint.position), np.asarray(joint.orientation)
+        place = spatial.placed(position, orientation, shift)
+        joint = Joint("fixed", position=place, orientation=spatial.snapped(orientation @ turn))
+    part = replace(body, joint=joint) if at else body
+    if joint.type.moves:
+        own = before.carrier if before and not before.at else Carrier(body.name, *_OWN)
+        if parent.name == body.parent:
+            return Place(at, parent, onto, part, own, part)
+    position = spatial.placed(parent.position, parent.orientation, np.asarray(joint.position))
+    orientation = spatial.snapped(parent.orientation @ np.asarray(joint.orientation))
+    if joint.type.moves:
+        joint = replace(joint, position=position, orientation=orientation)
+        return Place(at, parent, onto, part, own, replace(body, parent=parent.name, joint=joint))
+    moving = onto
+    if onto and not (vanishes(body.mass) and vanishes(body.inertia)):
+        center = spatial.placed(position, orientation, np.asarray(body.center))
+        inertia = spatial.product(orientation, np.asarray(body.inertia), orientation.T)
+        moving = _joined(onto, replace(part, center=center, inertia=inertia))
+    return Place(at, parent, onto, part, Carrier(parent.name, position, orientation), moving)
 
 
 def _joined(body: Body, other: Body) -> Body:
@@ -153,7 +176,7 @@ def resists(body: Body) -> bool:
     Raises MechanismError for more than float64 has.
     """
     with np.errstate(all="ignore"):
-        mass, _, inertia = inertia_in(axes_of(body), body)
+        mass, _, inertia = inertia_in(body, body.joint)
     if not (math.isfinite(float(mass)) and np.isfinite(inertia).all()):
         raise MechanismError(
             f"body {body.name!r}: its inertia about the joint is beyond float64, with all welded to it"

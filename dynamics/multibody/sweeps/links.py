@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -18,7 +19,7 @@ from ..algebra import spatial
 from ..algebra.spatial import Matrix, Triple
 from ..algebra.spatial_vectors import Twist
 from ..algebra.turns import Turn
-from ..bodies.body import Body
+from ..bodies.body import Body, Joint
 from ..bodies.joint_coordinates import places
 from ..joints import JointType
 from ..parameters import symbol
@@ -52,15 +53,15 @@ class Numbers(NamedTuple):
 class Link:
     """A body in the axes of its motion: numbers, or nodes that stand for them.
 
-    turn, place: its axes as columns, and its origin at q = 0, in the parent's axes.  moment: m c.  inertia: about the
+    turn, offset: its axes as columns, and its origin at q = 0, in the parent's axes.  first: m c.  inertia: about the
     origin.  angle: of a hinge, how far the axes are turned about its own beside its coordinate [rad].  lift: mass and
     moment of what is weightless.
     """
 
     turn: Matrix  # (3, 3)
-    place: Triple
+    offset: Array  # (3,) [m]
     mass: float | Node
-    moment: Triple
+    first: Array  # (3,) [kg m]
     inertia: Matrix  # (3, 3), the lower triangle counts
     damping: float | Node
     stiffness: float | Node
@@ -68,6 +69,16 @@ class Link:
     armature: float | Node
     angle: float = 0.0
     lift: Numbers | None = None
+
+    @cached_property
+    def place(self) -> Triple:
+        """The offset, as nodes."""
+        return spatial.constant(self.offset)
+
+    @cached_property
+    def moment(self) -> Triple:
+        """The first moment, as nodes."""
+        return spatial.constant(self.first)
 
     @property
     def weight(self) -> tuple[float | Node, Triple]:
@@ -86,9 +97,12 @@ class Link:
     def numbers(self) -> list[float | Node]:
         """Turn, place, mass, moment, inertia (lower triangle), damping, stiffness, spring reference, armature."""
         turn = [each for row in self.turn for each in row]
-        lower = [self.inertia[i][j] for i in range(3) for j in range(i + 1)]
+        lower = [each for k, row in enumerate(self.inertia, 1) for each in row[:k]]
         others = (self.damping, self.stiffness, self.spring_reference, self.armature)
-        return [spatial.plain(each) for each in (*turn, *self.place, self.mass, *self.moment, *lower, *others)]
+        return [
+            each if type(each) is float else spatial.plain(each)
+            for each in (*turn, *self.offset.tolist(), self.mass, *self.first.tolist(), *lower, *others)
+        ]
 
     @property
     def full_inertia(self) -> list[list[float | Node]]:
@@ -105,13 +119,8 @@ class Link:
     @property
     def inertial(self) -> Numbers:
         """Mass, first moment and inertia as arrays."""
-        moment = np.array([spatial.plain(each) for each in self.moment])
+        moment = np.array([spatial.plain(each) for each in self.first])
         return Numbers(self.mass, moment, np.array(self.full_inertia))
-
-    @property
-    def offset(self) -> Array:
-        """The place as an array, (3,)."""
-        return np.array([spatial.plain(each) for each in self.place])
 
     def with_more(self, added: Numbers) -> Link:
         """The link with these numbers added to its own."""
@@ -122,7 +131,7 @@ class Link:
     def with_inertial(self, numbers: Numbers) -> Link:
         """The link with these numbers in place of its own."""
         mass, moment, inertia = numbers
-        return replace(self, mass=mass, moment=spatial.constant(moment), inertia=inertia.tolist())
+        return replace(self, mass=mass, first=moment, inertia=inertia.tolist())
 
 
 class LinkState(NamedTuple):
@@ -197,9 +206,10 @@ def link_states(
     ]
 
 
-def axes_of(body: Body) -> Array:
-    """The axes of the body's motion, as columns in the body's; where its joint has an axis, the third is that."""
-    return body.joint.type.axes(np.asarray(body.joint.axis))
+@kept_by_first
+def motion_axes(joint: Joint) -> Array:
+    """The axes of a body's motion on its joint, as columns in the body's; if the joint has an axis, the third is it."""
+    return joint.type.axes(np.asarray(joint.axis))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,27 +222,36 @@ class MergedBody(Body):
     welded: tuple[Body, ...] = ()
 
 
-def inertia_in(axes: Array, body: Body) -> tuple[Any, Array, Array]:
-    """Mass, center of mass (3,), and inertia about the joint (3, 3) of a body alone, in these axes of it."""
+@kept_by_first
+def inertia_in(body: Body, joint: Joint) -> tuple[Any, Array, Array]:
+    """Mass, center of mass (3,), and inertia about the joint (3, 3) of a body alone, in the axes of motion on it."""
+    axes = motion_axes(joint)
     mass, center = symbol(body.mass), spatial.product(axes.T, np.asarray(body.center))
     about_center = spatial.product(axes.T, np.asarray(body.inertia), axes)
     return mass, center, spatial.parallel_axis(about_center, mass, center)
 
 
 @kept_by_first
-def link(body: Body, parent: Body | None) -> Link:
-    """The link of a checked body on its parent, None for the world."""
-    axes, outer, joint = axes_of(body), axes_of(parent) if parent else np.eye(3), body.joint
-    with building(Builder()), cg.tag(body.name):
-        turn = spatial.snapped(outer.T @ np.asarray(joint.orientation) @ axes)
-        place = spatial.constant(spatial.product(outer.T, np.asarray(joint.position)))
-        mass, center, inertia = inertia_in(axes, body)
+def joint_place(joint: Joint, outer: Joint | None) -> tuple[Matrix, Array]:
+    """Turn and offset of a `Link` on this joint."""
+    before = motion_axes(outer) if outer else np.eye(3)
+    turn = spatial.snapped(before.T @ np.asarray(joint.orientation) @ motion_axes(joint))
+    return turn.tolist(), spatial.product(before.T, np.asarray(joint.position))
+
+
+@kept_by_first
+def link(body: Body, outer: Joint | None) -> Link:
+    """The link of a checked body on a body with the joint `outer`, None for the world."""
+    joint, welded = body.joint, body.welded if isinstance(body, MergedBody) else ()
+    nodes = welded or object in [np.asarray(x).dtype for x in (body.mass, body.center, body.inertia, joint.position)]
+    with building(Builder()) if nodes else nullcontext(), cg.tag(body.name) if nodes else nullcontext():
+        turn, offset = joint_place(joint, outer)
+        mass, center, inertia = inertia_in(body, joint)
         moment = mass * center
-        for other in body.welded if isinstance(body, MergedBody) else ():
-            more, center, about_joint = inertia_in(axes, other)
+        for other in welded:
+            more, center, about_joint = inertia_in(other, joint)
             mass, moment, inertia = mass + more, moment + more * center, spatial.added(inertia, about_joint)
-        moment = spatial.constant(moment)
     damping, stiffness, reference, armature = map(
         symbol, (joint.damping, joint.stiffness, joint.spring_reference, joint.armature)
     )
-    return Link(turn.tolist(), place, mass, moment, inertia.tolist(), damping, stiffness, reference, armature)
+    return Link(turn, offset, mass, moment, inertia.tolist(), damping, stiffness, reference, armature)

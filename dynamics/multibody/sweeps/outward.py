@@ -149,7 +149,13 @@ def _velocity_at(motion: Motion, offset: Triple) -> Triple:
 
 
 def energy(motion: Motion, at: LinkState) -> Node:
-    """L_i = K_i - P_i with the first moment m c and the inertia J about the joint, without the center's velocity.
+    """L_i = K_i - P_i."""
+    kinetic, potential = energies(motion, at)
+    return kinetic - potential
+
+
+def energies(motion: Motion, at: LinkState) -> tuple[Node, Node]:
+    """K_i and P_i with the first moment m c and the inertia J about the joint, without the center's velocity.
 
     K = m v.v / 2 + m c . (v x w) + w . J w / 2,  P = m g h + g u . m c + spring.
     """
@@ -173,7 +179,7 @@ def energy(motion: Motion, at: LinkState) -> Node:
         potential = mass * motion.strength * motion.depth + spatial.dot(own.vertical, weight)
         for stretch in at.stretches():
             potential = potential + 0.5 * link.stiffness * (stretch * stretch)
-    return kinetic - potential
+    return kinetic, potential
 
 
 class Acceleration(NamedTuple):

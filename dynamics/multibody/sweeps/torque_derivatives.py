@@ -33,9 +33,8 @@ from cgraph.extend import Builder, as_node, building, cotangents
 
 from ...systems.body_terms import TorqueDerivatives
 from ...systems.kinematics import ONE, gathered
-from ..algebra.inertia import Inertia, Rows, rows, symmetric, traced
 from ..algebra.spatial import STILL, ZERO, Triple, combined, cross, dot, plus, scaled
-from ..algebra.spatial_vectors import IDLE, REST, Twist, Wrench
+from ..algebra.spatial_vectors import IDLE, REST, Inertia, Rows, Twist, Wrench, rows, symmetric, traced
 from ..algebra.turns import NEXT, UNIT, Axes, MatrixTurn, Turn, in_a_row
 from .links import Link, LinkState
 from .outward import KINETIC, POTENTIAL
@@ -110,7 +109,7 @@ def _root_frame(up: Triple, at: LinkState, tags: Tags, *, in_plane: bool) -> Fra
     else:
         with cg.tag(*tags):
             up = turn.into(up)
-    return _moved(at, tags, UNIT, Frame(STILL, axes, REST, Twist(STILL, up), (), UNIT, turn))
+    return moved_frame(at, tags, UNIT, Frame(STILL, axes, REST, Twist(STILL, up), (), UNIT, turn))
 
 
 def _next_frame(parent: Frame, at: LinkState, tags: Tags, *, in_plane: bool) -> Frame:
@@ -124,10 +123,10 @@ def _next_frame(parent: Frame, at: LinkState, tags: Tags, *, in_plane: bool) -> 
         velocity = parent.velocity.at(offset)
     with cg.tag(*tags):
         acceleration = parent.acceleration.at(offset)
-    return _moved(at, tags, before, Frame(offset, turn.columns(before), velocity, acceleration, (), before, turn))
+    return moved_frame(at, tags, before, Frame(offset, turn.columns(before), velocity, acceleration, (), before, turn))
 
 
-def _moved(at: LinkState, tags: Tags, before: Axes, frame: Frame) -> Frame:
+def moved_frame(at: LinkState, tags: Tags, before: Axes, frame: Frame) -> Frame:
     """The frame with the motion of the joint, as long as it has that of the body that carries it.
 
     before: the axes of the joint.
@@ -271,7 +270,7 @@ def torque_derivatives(states: Sequence[LinkState], up: Triple, build: Builder) 
                 alone = moving_body(link, frame.axes, frame.velocity, frame.acceleration, tags)
             composite = alone if carried is None else alone.plus(carried)
             with cg.tag(at.name):
-                reactions = [(column, _reaction(column, composite, tags)) for column in frame.columns]
+                reactions = [(column, reaction_of(column, composite, tags)) for column in frame.columns]
                 for column, _ in reactions:
                     with cg.tag(*tags):
                         result.torques[column.velocity] = column.motion.power(composite.wrench)
@@ -285,11 +284,11 @@ def torque_derivatives(states: Sequence[LinkState], up: Triple, build: Builder) 
                     result.torques[k] = result.torques[k] + at.link.armature * rate
                     result.mass[k][k] = result.mass[k][k] + at.link.armature
             with cg.tag(at.name, POTENTIAL):
-                _add_spring(result, at, build)
+                add_spring(result, at, build)
     return result
 
 
-def _add_spring(result: TorqueDerivatives, at: LinkState, build: Builder) -> None:
+def add_spring(result: TorqueDerivatives, at: LinkState, build: Builder) -> None:
     """The forces of a spring, and their slopes by displacements, G^T d/dq."""
     rate, end = at.joint.rate(at.q, at.u), at.first + len(at.u)
     for i, (_, force) in enumerate(at.springs(), at.first):
@@ -309,16 +308,16 @@ def _fill(
     """All entries of the freedoms of a body with their own and those between it and the world."""
     for inner, reaction in reactions:
         for outer in frames[at].columns:
-            _enter(result, outer, inner, reaction)
+            enter(result, outer, inner, reaction)
     while states[at].parent >= 0:
         reactions = [(column, reaction.about(frames[at].offset)) for column, reaction in reactions]
         at = states[at].parent
         for inner, reaction in reactions:
             for outer in frames[at].columns:
-                _enter_both(result, outer, inner, reaction)
+                enter_both(result, outer, inner, reaction)
 
 
-def _reaction(column: Column, of: MovingInertia, tags: Tags) -> Reaction:
+def reaction_of(column: Column, of: MovingInertia, tags: Tags) -> Reaction:
     """Reaction of a freedom at the base of the composite.  tags: the energies that accelerations come of."""
     motion = column.motion
     with cg.tag(KINETIC):
@@ -331,12 +330,12 @@ def _reaction(column: Column, of: MovingInertia, tags: Tags) -> Reaction:
     return Reaction(displaced, moved, accelerated, couple, tags)
 
 
-def _enter_both(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Reaction) -> None:
+def enter_both(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Reaction) -> None:
     """outer: between the world and inner, whose reaction is about the origin of the outer's body."""
     i, j = outer.velocity, inner.velocity
     with cg.tag(*reaction.tags):
         result.by_q[i][j] = outer.motion.power(reaction.displaced)  # dtau_i/dq_j = S_i . (I psi''_j + ..)
-        result.by_q[j][i] = _displaced_by(outer, reaction)
+        result.by_q[j][i] = displaced_by(outer, reaction)
     with cg.tag(KINETIC):
         result.by_qd[i][j] = outer.motion.power(reaction.moved)  # dtau_i/du_j = S_i . (I (psi'_j + S'_j) + 2 B S_j)
         # dtau_j/du_i = (psi'_i + S'_i) . I S_j + S_i . 2 B^T S_j
@@ -344,21 +343,21 @@ def _enter_both(result: TorqueDerivatives, outer: Column, inner: Column, reactio
         result.mass[i][j] = result.mass[j][i] = outer.motion.power(reaction.accelerated)
 
 
-def _enter(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Reaction) -> None:
+def enter(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Reaction) -> None:
     """Freedoms of one joint."""
     i, j = outer.velocity, inner.velocity
     if outer.stage < inner.stage:
-        _enter_both(result, outer, inner, reaction)
+        enter_both(result, outer, inner, reaction)
     elif outer.stage == inner.stage:
         with cg.tag(*reaction.tags):
-            result.by_q[j][i] = _displaced_by(outer, reaction)
+            result.by_q[j][i] = displaced_by(outer, reaction)
         with cg.tag(KINETIC):
             result.by_qd[i][j] = outer.motion.power(reaction.moved)
             if i <= j:
                 result.mass[i][j] = result.mass[j][i] = outer.motion.power(reaction.accelerated)
 
 
-def _displaced_by(outer: Column, reaction: Reaction) -> Node:
+def displaced_by(outer: Column, reaction: Reaction) -> Node:
     """Change of the force at the inner freedom by a displacement of the outer one."""
     # dtau_j/dq_i = psi''_i . I S_j + psi'_i . 2 B^T S_j
     return outer.carried_rate.power(reaction.accelerated) + dot(outer.carried.angular, reaction.couple)

@@ -1,9 +1,10 @@
-"""Mechanisms: trees of rigid bodies, on joints of one axis or several freedoms, or free."""
+"""Mechanisms: trees of rigid bodies, on joints of one axis or several freedoms, or free; their equations as nodes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -13,14 +14,14 @@ from numpy.typing import ArrayLike
 import cgraph as cg
 from cgraph import Graph, Node, _shared
 from cgraph._shared import Array, or_nearest, real_array, require_flag, require_mapping
-from cgraph.extend import Builder, building
+from cgraph.extend import Builder, building, hessian_nodes
 
 from ...systems.arguments import parameter_value
-from ...systems.body_terms import BodyTerms
+from ...systems.body_terms import BiasForce, BodyTerms, MotionState, TorqueDerivatives
 from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
-from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, body_name, quantities, vector
+from ..bodies.body import WORLD, Body, Joint, Limits, MechanismError, MechanismWarning, body_name, quantities, vector
 from ..bodies.composed_joints import locked_parts, outer_names, require_parents
 from ..bodies.joint_coordinates import (
     coordinate_names,
@@ -32,18 +33,19 @@ from ..bodies.joint_coordinates import (
     quasi_velocities,
     velocity_names,
 )
-from ..bodies.limits import Limits
-from ..forces.contact import Contact, check_contact, touch
-from ..forces.external_force import Force
+from ..forces.contact import Contact, Force, check_contact, touch
 from ..forces.joint_force import JointForce, check_any_force, generalized_forces
+from ..joints import JointType
 from ..loops import Loop, check_loops, of_loops, position_rows, velocity_rows
-from ..parameters import Quantity, bound, entries, names_in, symbol, vanishes
+from ..parameters import Quantity, bound, entries, names_in, symbol
+from ..sweeps.equation_links import base_parameter_links, equation_links, without_axial_moments
 from ..sweeps.kinematic_chain import KinematicChain, kinematic_chains
-from ..sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
-from ..sweeps.links import Link, Numbers
+from ..sweeps.kinematic_tree import GROUND, Carrier, Place, placed_bodies, require_inertia, resists
+from ..sweeps.links import Link, LinkState, Numbers, link, link_states, motion_axes
+from ..sweeps.mass_matrix import PlacedLink, mass_matrix_columns, momentum_rates, size_of
+from ..sweeps.outward import Motion, base_acceleration, energy, ground, motions, wrenches
 from .joint_positions import skeleton
 from .structure import Structure, bound_body, bound_force, changed, checked_parts, listed, require_values, used_names
-from .tree_equations import TreeEquations
 
 __all__ = [
     "WORLD",
@@ -60,6 +62,171 @@ __all__ = [
 ]
 
 SHOWN = 6  # names of a kind that a repr shows, at most
+WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
+UNEVEN = 200.0  # times a body's moments of inertia, at most, for base numbers that are not looked at further
+
+
+class TreeEquations:
+    """Nodes of the motion of bodies, parents first, under a structure's gravity."""
+
+    def __init__(self, structure: Structure, bodies: Sequence[Body], lifts: Mapping[str, Numbers]) -> None:
+        self.bodies, self.base_parameters, self.lifts = bodies, structure.base_parameters, lifts
+        self.gravity = quantities("gravity", structure.gravity)
+
+    @cached_property
+    def parents(self) -> list[int]:
+        """Index of the body that carries each body, -1 for the world."""
+        index = {body.name: i for i, body in enumerate(self.bodies)}
+        return [index.get(body.parent, -1) for body in self.bodies]
+
+    @cached_property
+    def links(self) -> list[Link]:
+        """Links of the bodies, in the bodies' own frames."""
+        return self._regrouped(self._own)[0] if self.base_parameters else self._own
+
+    @cached_property
+    def _types(self) -> list[JointType]:
+        return [body.joint.type for body in self.bodies]
+
+    @cached_property
+    def ground(self) -> Motion:
+        """The world at rest."""
+        inner = [link for link, parent in zip(self.links, self.parents, strict=True) if parent >= 0]
+        axial = all([joint.has_axis for joint in self._types])
+        in_plane = axial and all([link.parallel for link in inner])
+        return ground(self.gravity, in_plane=in_plane)
+
+    @cached_property
+    def _turning(self) -> bool:
+        """Whether the directions of all joints turn with their bodies, which closed forms take for granted."""
+        return all([joint.turns_with_body for joint in set(self._types)])
+
+    @cached_property
+    def _own(self) -> list[Link]:
+        outer = [self.bodies[i].joint if i >= 0 else None for i in self.parents]
+        links = [link(body, joint) for body, joint in zip(self.bodies, outer, strict=True)]
+        for i, body in enumerate(self.bodies):
+            if lift := self.lifts.get(body.name):
+                links[i] = replace(links[i], lift=lift.turned(motion_axes(body.joint).T))
+        return links
+
+    @cached_property
+    def _placed(self) -> list[Link]:
+        """The links in the frames of the equations."""
+        return equation_links(self._own, self._types, self.parents)
+
+    @cached_property
+    def _links(self) -> tuple[list[Link], Array]:
+        """The links of the equations, and the first moment of what of their inertia is the world's."""
+        return self._regrouped(self._placed) if self.base_parameters else (self._placed, np.zeros(3))
+
+    @cached_property
+    def _fewest(self) -> list[Link]:
+        """The links in as few inertial numbers as there can be, unless these would have to be computed in the graph."""
+        return self._regrouped(self._placed, fewer=True)[0] if self._numeric else self._links[0]
+
+    @cached_property
+    def whole(self) -> TreeEquations | None:
+        """Equations without base numbers, where these are larger than the bodies' by decades; else None."""
+        numbers = zip(self._fewest, self._links[0], strict=True)
+        if not self._numeric or all([_size(few) <= UNEVEN * _size(own) for few, own in numbers]):
+            return None
+        result = copy(self)
+        vars(result)["_fewest"] = self._links[0]
+        return result
+
+    def _regrouped(self, links: Sequence[Link], *, fewer: bool = False) -> tuple[list[Link], Array]:
+        return base_parameter_links(links, self._types, self.parents, fewer=fewer)
+
+    @cached_property
+    def _numeric(self) -> bool:
+        """Whether no link has parameters."""
+        joints = [isinstance(number, Node) for link in self._own for number in link.numbers]
+        return not any(joints) and all([link.is_numeric for link in self._own])
+
+    def states(
+        self,
+        q: Sequence[Node],
+        u: Sequence[Node],
+        links: Sequence[Link] | None = None,
+        u_dot: Sequence[Node] | None = None,
+    ) -> list[LinkState]:
+        """The links, by default the bodies' own, at a state."""
+        return link_states(self.bodies, links or self.links, self.parents, q, u, u_dot)
+
+    def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
+        """Lagrangian of each body, tagged with its name and energy."""
+        with building(Builder()):
+            partials = self._partials(self.states(q, qd, self._links[0]))
+            if self.base_parameters:
+                with cg.tag("potential"):
+                    moment = spatial.scaled(self.ground.strength, spatial.constant(self._links[1]))
+                    partials[0] = partials[0] - spatial.dot(self.ground.vertical, moment)
+        return partials
+
+    def regrouped_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
+        """Lagrangians of base numbers: their sum lacks only terms that no derivative shows."""
+        with building(Builder()):
+            return self._partials(self.states(q, qd, self._fewest))
+
+    def _partials(self, states: Sequence[LinkState]) -> list[Node]:
+        partials = []
+        for motion, at in zip(self._motions(states), states, strict=False):
+            with cg.tag(at.name):
+                partials.append(energy(motion, at))
+        return partials
+
+    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> list[BiasForce]:
+        """The wrenches of all bodies at these accelerations, with the velocities that they work on."""
+        with building(Builder()):
+            states = self.states(q, qd, self._fewest, qdd)
+            return wrenches(states, self._motions(states))
+
+    def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
+        """The lower triangle of M by composite inertias; or from the Lagrangian, where that takes fewer nodes."""
+        links = self._regrouped(equation_links(self._own, self._types, self.parents, outwards=True))[0]
+        with building(build):
+            links = without_axial_moments(links if self._numeric else self._fewest, self._types, self.parents)
+            states = self.states(q, qd, links)
+            planes = [motion.plane for motion in self._motions(states)]
+            carried = [PlacedLink(at, plane, planes[at.parent]) for at, plane in zip(states, planes, strict=False)]
+            columns = mass_matrix_columns(carried, len(qd))
+        hinged = self._numeric and all([joint.kind == "revolute" for joint in self._types])
+        if hinged and self.parents == list(range(-1, len(self.bodies) - 1)):  # one on another: these are the fewest
+            return columns
+        derived = hessian_nodes(lagrangian, qd, build)  # with nodes that other equations have as well
+        return columns if size_of(columns) < WORTH * size_of(derived) else derived
+
+    def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:
+        """dp/dt without applied forces at velocities qd that belong to p, by composite momentum.
+
+        None, as of the derivatives, where directions of a joint depend on its coordinates: they follow from L.
+        """
+        if not self._turning:
+            return None
+        with building(Builder()):
+            states = self.states(q, qd, self._fewest)
+            return momentum_rates(states, self._motions(states), p)
+
+    def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives | None:
+        """Torques of all bodies, with their springs, and their derivatives; None also where weight is balanced."""
+        if self.lifts or not self._turning:
+            return None
+        from ..sweeps.torque_derivatives import torque_derivatives
+
+        with building(build):
+            up = base_acceleration(self.ground).linear
+            q, u, u_dot = state
+            return torque_derivatives(self.states(q, u, self._links[0], u_dot), up, build)
+
+    def _motions(self, states: Sequence[LinkState]) -> list[Motion]:
+        """The motions of the links, and that of the world last, so that -1 is its place."""
+        return [*motions(states, self.ground), self.ground]
+
+
+def _size(link: Link) -> float:
+    """The largest of its moments of inertia and armature."""
+    return max(float(np.abs(np.array(link.full_inertia, dtype=np.float64)).max()), float(link.armature))
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +287,7 @@ class Mechanism(Structure):
         kinds = {"bodies": (Body,), "forces": (Force, JointForce, Contact), "loops": (Loop,), "left_out": (str,)}
         for what, allowed in kinds.items():  # kept, so that an iterator is read once
             object.__setattr__(self, what, listed(what, allowed, getattr(self, what)))
-        parts = [part for body in self.bodies for part in checked_parts(body)]
+        parts = self._checked
         for name, state in require_mapping("starts", self.starts, "name: state").items():
             require_mapping(f"start {name!r:.60}", state, "name: number")
         for name, value in require_mapping("parameters", self.parameters, "name: value").items():
@@ -135,7 +302,7 @@ class Mechanism(Structure):
         carried = {body.name for body in self.bodies}
         for force in self.forces:
             check_any_force(force, carried, self.bodies)
-        used = used_names(self.bodies, self.gravity, self.forces)
+        used = used_names(self.bodies, self.gravity, self.forces) if self.parameters else {}
         for name in self.parameters:
             if name not in used:
                 raise MechanismError(
@@ -152,12 +319,10 @@ class Mechanism(Structure):
     def __repr__(self) -> str:
         return f"<Mechanism of {'; '.join(_summary(self))}>"
 
-    @cached_property
+    @property
     def parts(self) -> tuple[Body, ...]:
         """All bodies as the equations have them, parents first: a locked joint a weld, those of several parts apart."""
-        parts = [part for body in self.bodies for part in checked_parts(body)]
-        require_parents(self.bodies)
-        return tuple(parents_first(lock_joints(parts, locked_parts(self.bodies, self.standing))))
+        return tuple([place.part for place in self._tree[0].values()])
 
     @property
     def moving(self) -> tuple[Body, ...]:
@@ -165,7 +330,7 @@ class Mechanism(Structure):
 
         Where there are parameters, what is welded is kept beside: `bind` them to see sums.
         """
-        return self._merged[0]
+        return self._tree[1]
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
@@ -187,19 +352,25 @@ class Mechanism(Structure):
         """The mechanism itself, as a `Model` has it."""
         return self
 
-    @property
+    @cached_property
     def carriers(self) -> dict[str, Carrier]:
         """Placement of every body in the frame of the moving body that carries it."""
-        return self._merged[1]
+        return {WORLD: GROUND} | {body.name: place.carrier for body, place in self._tree[0].items()}
 
     @cached_property
-    def _merged(self) -> tuple[tuple[Body, ...], dict[str, Carrier]]:
-        moving, carriers = merge_fixed_bodies(self.parts)
-        numbers = [bound_body(part, self.parameters) for part in self.parts]
-        if numbers != list(self.parts):
-            numbers = [part for body in numbers for part in checked_parts(body)]
-        require_inertia(moving if numbers == list(self.parts) else merge_fixed_bodies(numbers)[0])
-        return tuple(moving), carriers
+    def _checked(self) -> list[Body]:
+        return [part for body in self.bodies for part in checked_parts(body)]
+
+    @cached_property
+    def _tree(self) -> tuple[dict[Body, Place], tuple[Body, ...]]:
+        require_parents(self.bodies)
+        at, before = locked_parts(self.bodies, self.standing), vars(self).pop("_before", {})
+        places, moving = found = placed_bodies(self._checked, at, before)
+        parts = [place.part for place in places.values()]
+        if self.parameters and (numbers := [bound_body(part, self.parameters) for part in parts]) != parts:
+            moving = placed_bodies([part for body in numbers for part in checked_parts(body)], {}, {})[1]
+        require_inertia(moving)
+        return found
 
     @cached_property
     def _bound(self) -> Mechanism:
@@ -213,10 +384,10 @@ class Mechanism(Structure):
     def _lifts(self) -> dict[str, Numbers]:
         """What of each moving body, and of all that is welded to it, is weightless."""
         lifts: dict[str, Numbers] = {}
-        with building(Builder()):
-            for body in self.parts:
-                carrier = self.carriers[body.name]
-                if carrier.name != WORLD and not vanishes(body.gravity_compensation):
+        build = Builder()
+        for body in [each for each in self.parts if each.gravity_compensation != 0.0]:
+            if (carrier := self.carriers[body.name]).name != WORLD:
+                with building(build):
                     center = spatial.placed(carrier.position, carrier.orientation, np.asarray(body.center))
                     mass: Any = symbol(body.gravity_compensation) * symbol(body.mass)
                     known = lifts.get(carrier.name, Numbers(0.0, np.zeros(3), np.zeros((3, 3))))
@@ -234,14 +405,14 @@ class Mechanism(Structure):
             lambda q, qd, t: self._equations.partial_lagrangians(q, qd),
             self.coordinates,
             self.parameter_values,
-            forces=self._generalized_forces if self.forces else None,
+            forces=self.generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
             constraints=lambda q, t: position_rows(
                 self.loops, self.moving, self.carriers, self.standing, self._equations.states(q, ())
             ),
             velocity_constraints=lambda q, qd, t: velocity_rows(self.loops, lambda body: self._chain(body, q, qd)),
-            body_terms=BodyTerms(self._equations, lengths(self._bound.moving), regular, self._require_values),
+            body_terms=BodyTerms(self._equations, lengths(self._bound.moving), regular, self._require_values, self),
         )
         system.constraints = of_loops(system.constraints, self.loops, self.moving)
         return system
@@ -250,7 +421,8 @@ class Mechanism(Structure):
         with outer_names(self.bodies):
             require_values(self.parts if bodies is None else bodies, self.gravity, self.forces, values)
 
-    def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
+    def generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: Mapping[str, Node]) -> list[Node]:
+        """Forces along the velocities qd of all `forces`, at time t and parameters p."""
         return generalized_forces(
             self.forces, lambda body: self._chain(body, q, qd), self.moving, (q, qd), p, self.locked
         )

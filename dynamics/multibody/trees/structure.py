@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Self, TypeVar
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph._shared import HoldsNodes, kept_by_first, require_mapping
+from cgraph._shared import Array, HoldsNodes, kept_by_first, require_mapping
 
 from ..bodies.body import (
     BODY_QUANTITIES,
@@ -25,6 +26,7 @@ from ..bodies.body import (
     MechanismError,
     body_name,
     checked,
+    moment_rounding,
     quantities,
 )
 from ..bodies.composed_joints import parts_of
@@ -82,7 +84,7 @@ class Subtree:
         if not isinstance(parent, str):
             raise MechanismError(f"a parent is named by a string, got {type(parent).__name__}: {parent!r:.60}")
         first, *others = self.bodies
-        return replace(first, parent=parent), *others
+        return first if parent == first.parent else replace(first, parent=parent), *others
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +128,13 @@ class Structure(HoldsNodes, ABC):
                 standing |= coupled(loop, standing)
         return standing
 
+    def _with(self, **changes: Any) -> Self:
+        """A copy with other fields, which takes what is merged of numbers of bodies that hang on the same as before."""
+        result = copy(self)
+        vars(result).update(changes if self.parameters else {**changes, "_before": vars(self)["_tree"][0]})
+        result.__post_init__()  # type: ignore[attr-defined]  # the checks of `Mechanism`
+        return result
+
     def lock(self, body: str, at: float | ArrayLike | None = None) -> Self:
         """The mechanism with the joint of a body standing still at a coordinate [rad or m], or several; by default 0.
 
@@ -139,14 +148,19 @@ class Structure(HoldsNodes, ABC):
         if at is None:
             known = [each.joint.neutral for each in self.bodies if each.name == body]
             at = known[0] if known and len(known[0]) != 1 else 0.0
-        return replace(self, locked={**self.locked, body: at})
+        return self._with(locked={**self.locked, body: at})
 
     def unlock(self, body: str) -> Self:
         """The mechanism with a locked joint free again. Raises MechanismError for one that is not locked."""
         body = body_name(self.bodies, body, "to unlock ")
         if body not in self.locked:
             raise MechanismError(f"the joint of body {body!r:.80} is not locked")
-        return replace(self, locked={name: at for name, at in self.locked.items() if name != body})
+        return self._with(locked={name: at for name, at in self.locked.items() if name != body})
+
+    def with_body(self, body: Body) -> Self:
+        """The mechanism with a body in place of the one of its name. Raises MechanismError where there is none."""
+        name = body_name(self.bodies, str(getattr(body, "name", body)))
+        return replace(self, bodies=tuple([body if each.name == name else each for each in self.bodies]))
 
     def subtree(self, body: str) -> Subtree:
         """A body and all that it carries, as `attach` takes it. Raises MechanismError for an unknown body."""
@@ -200,8 +214,7 @@ class Structure(HoldsNodes, ABC):
                 )
         back = to is None or to == given.parent
         bodies = given.with_parent(given.parent if to is None else to)
-        return replace(
-            self,
+        return self._with(
             bodies=tuple(inserted(tuple(self.bodies), bodies, given.places if back else ())),
             forces=(*self.forces, *given.forces),
             parameters={**self.parameters, **given.parameters},
@@ -257,10 +270,10 @@ def changed(
     structure: AnyStructure, values: Mapping[str, float] = MappingProxyType({}), **changes: Any
 ) -> AnyStructure:
     """The structure with other fields; of its parameters, those that it then still has, some with other values."""
-    result = {"bodies": structure.bodies, "gravity": structure.gravity, "forces": structure.forces} | changes
-    used = used_names(result["bodies"], result["gravity"], result["forces"])
+    result = {name: changes.get(name, getattr(structure, name)) for name in ("bodies", "gravity", "forces")}
+    used = used_names(*result.values()) if structure.parameters or values else {}
     parameters = {name: value for name, value in {**structure.parameters, **values}.items() if name in used}
-    return replace(structure, parameters=parameters, **changes)
+    return structure._with(parameters=parameters, **changes)
 
 
 def listed(what: str, kinds: tuple[type, ...], given: object) -> tuple[Any, ...]:
@@ -298,7 +311,7 @@ def _uses_of(body: Body) -> tuple[Use, ...]:
 
 def _uses_in(where: str, owner: object, checks: Mapping[str, Check]) -> Iterator[Use]:
     for name, check in checks.items():
-        if names := names_in(entries(value := getattr(owner, name))):
+        if type(value := getattr(owner, name)) is not float and (names := names_in(entries(value))):
             yield f"{where}: {name}", value, names, check
 
 
@@ -322,8 +335,6 @@ def require_values(
         rows = evaluated(value, at)
         varied, looked_at = any([each.ndim for each in at.values()]), [0]
         if varied:
-            from ..bodies.many_values import unsure  # which one set of values does not need
-
             looked_at = unsure(check, rows)
         for k in looked_at:
             row = rows[k] if varied else rows
@@ -354,3 +365,49 @@ def bound_force(force: AnyForce, values: Mapping[str, float]) -> AnyForce:
         return replace(force, **numbers) if numbers else force
     value, torque = ([bound(each, values) for each in three] for three in (force.value, force.torque))
     return replace(force, value=value, torque=torque)
+
+
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+LARGEST = np.finfo(float).max / 4.0  # entry of an inertia, so that sums of moments are finite
+
+
+def unsure(check: Callable[[str, object], Any], rows: Array) -> list[int]:
+    """Which of many values, (N, ..), to look at one by one: the first, whose shape is that of all, and any in doubt."""
+    surely = SURELY.get(check)
+    if surely is None:  # a check of its own kind
+        return list(range(len(rows)))
+    flags = surely(rows)
+    flags[:1] = False
+    which: list[int] = np.flatnonzero(~flags).tolist()
+    return which
+
+
+def _finite(rows: Array) -> Flags:
+    return np.asarray(np.isfinite(rows).reshape(len(rows), -1).all(axis=1))
+
+
+def _not_negative(rows: Array) -> Flags:
+    return np.asarray(_finite(rows) & (rows >= 0.0))
+
+
+def _inertial(rows: Array) -> Flags:
+    """Of inertias, (N, 3) or (N, 3, 3): symmetric, and with the moments of a body."""
+    good = (np.abs(rows) < LARGEST).reshape(len(rows), -1).all(axis=1)
+    if rows.ndim == 3:
+        good &= (rows == rows.transpose(0, 2, 1)).all(axis=(1, 2))
+    known = rows.copy()
+    known[~good] = 0.0
+    moments = np.linalg.eigvalsh(known) if rows.ndim == 3 else np.sort(known, axis=1)
+    rounding = moment_rounding(1.0, 0.0) * np.abs(known).reshape(len(rows), -1).max(axis=1)
+    flags: Flags = good & (moments[:, 0] >= -rounding) & (moments[:, 2] <= moments[:, 0] + moments[:, 1] + rounding)
+    return flags
+
+
+# For each check of a number, or of an array of them, which of many values it takes without a word.
+SURELY: dict[Callable[[str, object], Any], Callable[[Array], Flags]] = {
+    BODY_QUANTITIES["mass"]: _not_negative,
+    BODY_QUANTITIES["center"]: _finite,
+    BODY_QUANTITIES["inertia"]: _inertial,
+    JOINT_QUANTITIES["damping"]: _not_negative,
+    JOINT_QUANTITIES["spring_reference"]: _finite,
+}

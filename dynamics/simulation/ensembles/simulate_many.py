@@ -142,7 +142,8 @@ def simulate_many(
         require_room(8 * count * start.x.size, what, "record fewer times (t_eval), simulate fewer or name a store")
 
     # Derive the equations as graphs, and write the steps of the method over them
-    begin, problem = time.perf_counter(), switched(in_form(derive(applied.model, start.bound), form))
+    begin, by_rows = time.perf_counter(), steps.integrator.by_rows
+    problem = switched(in_form(derive(applied.model, start.bound, by_rows=by_rows), form))
     watch, nq = event_program(problem, watched), problem.nq
 
     # Integrate, by whoever takes the chunks and compiles the steps

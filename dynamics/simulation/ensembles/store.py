@@ -158,7 +158,7 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
     """What makes a sweep of states x (N, m) with parameters p (N, ..): equations, options, and by which versions."""
     program, options, watched = task.program, task.options, task.events.events if task.events else ()
     parts = [(part, field.name) for part in (task.span, options) for field in fields(part) if field.init]
-    model = [problem.rate, problem.velocities, program.normalization]
+    model = [problem.evaluation.called, problem.velocities, program.normalization]
     events = [graph for event in watched for graph in (event.values, event.reset)]
     known = {
         "format": FORMAT,
@@ -175,7 +175,7 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "steps": _digest(*[cg.structure_hash(graph).encode() for graph in program.steps.graphs()]),
         "trajectories": len(x),
         "starts": _digest(x.tobytes()),
-        "parameters": _digest(p.tobytes()),
+        "parameters": _digest(p.tobytes(), *[each.tobytes() for each in problem.evaluation.shared.values()]),
     }
     sweep: dict[str, Json] = json.loads(json.dumps(known, default=float))
     return sweep

@@ -26,8 +26,9 @@ from ..events.event import EventProgram
 from ..events.modes import Modes
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import Span, Steps
-from ..stepper import BLOCK_TIME, HELD, ChosenStepper, Stepper, StoppedError, first_registers, span_registers, stepper
+from ..stepper import BLOCK_TIME, HELD, ChosenStepper, Stepper, StoppedError, first_registers, stepper
 from ..steps.equal_steps import EqualSteps, Numbers, even_steps, instants_of
+from ..steps.first_step import start_registers
 from ..steps.state_sizes import Flags
 from ..steps.step_program import StepProgram, compile_steps, step_program
 from .ensemble import COLUMNS, Part
@@ -102,7 +103,8 @@ class LaneRun:
         self._passes = np.zeros((len(x), 2), np.int64)  # how many each has made, and how many marks of its clock passed
         self._set({"x": x, "p": p, "fresh": 1.0})
         if program.adaptive:
-            self._set(first_registers(program, options) | span_registers(span) | {"lanes.toward": span.direction})
+            ends = start_registers({"t_end": span.t_end, "goal": span.t_end})
+            self._set({**first_registers(program, options), **ends, "t": span.t0, "lanes.toward": span.direction})
 
     def to_end(self, legs: Sequence[Leg], rows: Array, stopped: Stopped) -> LaneRuns:
         """Go all legs, with states for rows (k, T, m), NaN from where a run stops on."""

@@ -9,7 +9,6 @@ polynomials through values.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -23,6 +22,7 @@ from cgraph.extend import enclosure
 
 from ...integrators.problem import reaches
 from ..steps.dense_output import UNIT, Indices, StepBlock
+from ..steps.row_values import compiled
 from ..steps.state_sizes import Flags
 
 MOST_CELLS, TOGETHER = 4096, 256  # that wait at once, and steps that are searched together
@@ -59,18 +59,6 @@ class Quantities:
     resolved: int = 0  # of the last ones, how many are as smooth as the rate
 
     @cached_property
-    def bounded(self) -> Quantities:
-        """The others."""
-        outputs = list(self.values.outputs.items())
-        return Quantities(Graph(self.values.inputs, dict(outputs[: len(outputs) - self.resolved])), self.size)
-
-    @cached_property
-    def fitted(self) -> Graph:
-        """Those that are as smooth as the rate."""
-        outputs = list(self.values.outputs.items())
-        return Graph(self.values.inputs, dict(outputs[len(outputs) - self.resolved :]))
-
-    @cached_property
     def states(self) -> list[int]:
         """States that they depend on."""
         return [k for k in range(self.size) if reaches(self.values.outputs.values(), self.values.inputs[k : k + 1])]
@@ -97,12 +85,16 @@ class Quantities:
         """The same of the slopes."""
         return enclosure(self.slopes, exact=self._parameters)
 
+    @property
+    def bounded(self) -> int:
+        """How many of the first ones are not resolved."""
+        return len(self.values.outputs) - self.resolved
+
     @kept_by_first
-    def part(self, number: int) -> Quantities:
-        """One of them."""
-        name, node = list(self.values.outputs.items())[number]
-        is_resolved = number >= len(self.values.outputs) - self.resolved
-        return Quantities(Graph(self.values.inputs, {name: node}), self.size, int(is_resolved))
+    def part(self, first: int, last: int) -> Quantities:
+        """Those from a number to another."""
+        outputs = dict(list(self.values.outputs.items())[first:last])
+        return Quantities(Graph(self.values.inputs, outputs), self.size, max(0, last - max(first, self.bounded)))
 
     @property
     def _parameters(self) -> list[str]:
@@ -113,48 +105,22 @@ quantities = kept_by_first(Quantities)
 
 
 class _Batch:
-    """The outputs (k, N) of a graph at points (inputs, N), operation by operation; often asked, by machine code."""
+    """The outputs (k, N) of a graph at points (inputs, N), by Python's code; often asked, by machine code."""
 
     def __init__(self, graph: Graph) -> None:
-        self._graph, self._calls = graph, 0
-        self._function: Callable[[Array], Array] | None = None
+        self._graph, self._calls, self._function = graph, 0, compiled(graph, "python").batch
 
     def __call__(self, points: Array) -> Array:
         """The outputs."""
-        self._calls += 1 + points.shape[1] // ALIKE
-        if self._calls >= OFTEN and self._function is None:
+        before, self._calls = self._calls, self._calls + 1 + points.shape[1] // ALIKE
+        if before < OFTEN <= self._calls:
             self._function = cg.compile(self._graph).batch
-        if self._function is not None:
-            return self._function(points)
-        result, values = np.empty((len(self._graph.outputs), points.shape[1])), _operations(self._graph, numbers=False)
-        together = max(1, 8 * MOST_NUMBERS // len(self._graph.nodes))
-        for first in range(0, points.shape[1], together):
-            for row, value in zip(result, values(points[:, first : first + together]), strict=True):
-                row[first : first + together] = value
-        return result
+        together = max(1, 8 * MOST_NUMBERS // len(self._graph.nodes))  # what a graph in Python holds at once
+        parts = np.split(points, range(together, points.shape[1], together), axis=1)
+        return np.concatenate([self._function(part) for part in parts], axis=1)
 
 
 _batch = kept_by_first(_Batch)
-
-
-@kept_by_first
-def _operations(graph: Graph, *, numbers: bool) -> Callable[[Iterable[Any]], list[Any]]:
-    """The outputs at numbers, or at arrays, operation by operation."""
-    leaves = [*graph.inputs, *[node for node in graph.nodes if node.value is not None]]
-    made = [node for node in graph.nodes if node.args]
-    place = {node: k for k, node in enumerate([*leaves, *made])}
-    constants = [node.value for node in leaves[len(graph.inputs) :]]
-    functions = [node.op.scalar if numbers else node.op.array for node in made]
-    slots = [[place[arg] for arg in node.args] for node in made]
-    wanted = [place[node] for node in graph.outputs.values()]
-
-    def values(inputs: Iterable[Any]) -> list[Any]:
-        known = [*inputs, *constants]
-        for function, arguments in zip(functions, slots, strict=True):
-            known.append(function(*[known[slot] for slot in arguments]))
-        return [known[slot] for slot in wanted]
-
-    return values
 
 
 def outputs_of(graph: Graph, *parts: Any) -> Array:
@@ -185,7 +151,7 @@ def first_crossing(watched: Quantities, p: Array, block: StepBlock, fresh: Array
     low, _ = _bounds(watched, p, block, rows, np.zeros(len(rows)), np.ones(len(rows)))
     doubtful, number = np.nonzero(~(low >= 0.0).T)
     for n in dict.fromkeys(number.tolist()):
-        one, where = watched.part(n), doubtful[number == n]
+        one, where = watched.part(n, n + 1), doubtful[number == n]
         left = 0.0 if where[0] else _left_at(one, p, block, fresh[n])
         for steps in np.split(where, range(TOGETHER, len(where), TOGETHER)):
             a = np.where(steps == 0, left, 0.0)
@@ -208,7 +174,7 @@ def _first_zero(
     most = max(64, min(MOST_CELLS, MOST_NUMBERS // len(one.values.nodes)))
     found: tuple[int, float] | None = None
     while len(rows):
-        begins, ends = np.split(_values(one, p, block, np.tile(rows, 2), np.concatenate([a, b]))[0], 2)
+        begins, ends = np.split(_values(one.values, p, block, np.tile(rows, 2), np.concatenate([a, b]))[0], 2)
         clear, goes_one_way, _ = told_by_slopes(one, p, block, (rows, a, b), begins, ends)
         told = clear | goes_one_way | (b - a <= (FINE if one.resolved else SHORTEST))
         passes = np.flatnonzero(told & ((begins < 0.0) | (ends < 0.0)))
@@ -259,7 +225,7 @@ def _left_at(one: Quantities, p: Array, block: StepBlock, rounding: float) -> fl
     """The share of the first step from which a quantity that begins at zero is looked at; 1 if it stays on its side."""
     if math.isnan(rounding):
         return 0.0
-    begin, *values = _values(one, p, block, np.zeros(len(PARTS), dtype=np.intp), PARTS)[0]
+    begin, *values = _values(one.values, p, block, np.zeros(len(PARTS), dtype=np.intp), PARTS)[0]
     if begin > rounding:
         return 0.0
     sizes = np.abs(values)
@@ -267,14 +233,14 @@ def _left_at(one: Quantities, p: Array, block: StepBlock, rounding: float) -> fl
     return float(PARTS[1 + left[0]]) if len(left) else 1.0 - UNIT if values[-1] < -rounding else 1.0
 
 
-def _values(one: Quantities, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:
-    return outputs_of(one.values, block.polynomials_at(rows, s).T, block.times_at(rows, s)[None], p)
+def _values(graph: Graph, p: Array, block: StepBlock, rows: Indices, s: Array) -> Array:
+    return outputs_of(graph, block.polynomials_at(rows, s).T, block.times_at(rows, s)[None], p)
 
 
 def _root(one: Quantities, p: Array, block: StepBlock, row: int, low: float, high: float) -> float:
     """The first share of a step, but for rounding, at which a quantity that falls is below zero (Chandrupatla 1997)."""
     assert block.dense is not None
-    t, h, m, function = float(block.t_old[row]), float(block.h[row]), one.size, _operations(one.values, numbers=True)
+    t, h, m, function = float(block.t_old[row]), float(block.h[row]), one.size, compiled(one.values, "python").values
     known, powers = [*block.x_old[row].tolist(), t, *p.tolist()], block.dense[row][::-1].T.tolist()
     moving = [(k, known[k], powers[k]) for k in one.states]
 
@@ -351,15 +317,15 @@ def _ends(points: Array) -> tuple[Array, Array]:
 def _fitted_points(graph: Graph, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array) -> Array:
     """Control points (k, n, degree + 1) of polynomials through the values of quantities on cells."""
     s, each = (a[:, None] + (b - a)[:, None] * NODES).reshape(-1), np.repeat(rows, len(NODES))
-    values = outputs_of(graph, block.polynomials_at(each, s).T, block.times_at(each, s)[None], p)
-    return np.asarray(values.reshape(-1, len(rows), len(NODES)) @ TO_POINTS.T)
+    return np.asarray(_values(graph, p, block, each, s).reshape(-1, len(rows), len(NODES)) @ TO_POINTS.T)
 
 
 def _bounds(watched: Quantities, p: Array, block: StepBlock, rows: Indices, a: Array, b: Array) -> tuple[Array, Array]:
     """Lower and upper bounds of quantities on cells, (k, n)."""
     if watched.resolved:
-        bounded = _bounds(watched.bounded, p, block, rows, a, b)
-        fitted = _fitted_points(watched.fitted, p, block, rows, a, b)
+        bounded = _bounds(watched.part(0, watched.bounded), p, block, rows, a, b)
+        smooth = watched.part(watched.bounded, len(watched.values.outputs))
+        fitted = _fitted_points(smooth.values, p, block, rows, a, b)
         return np.vstack([bounded[0], fitted.min(axis=2)]), np.vstack([bounded[1], fitted.max(axis=2)])
     points, affine = _state_points(block, rows, a, b), np.array(watched.affine)
     low, high = np.empty((2, len(affine), len(rows)))

@@ -13,9 +13,9 @@ from cgraph import Graph, Node
 from cgraph._shared import Array, HoldsNodes, check_name, columns, is_function, require_kind
 from cgraph.extend import Builder, building, topological
 
-from ...equations.substitute import substitute
 from ...integrators import Problem, quantity, quantity_inputs, state_arguments
 from ...systems.arguments import call_user_function, new_variables, node_or_number, sequence
+from ...systems.kinematics import substitute
 from ..steps.dense_output import UNIT
 from ..steps.row_values import values_of
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -69,6 +69,7 @@ class Modes:
     def __init__(self, problem: Problem) -> None:
         assert problem.switches is not None
         self.plain, self._switches = problem, problem.switches
+        self.words = problem.switches.words  # of the surfaces, as formulas
         self.values, self.direction = np.ones(len(self._switches.modes)), 1.0  # -1 where time runs back
         self.turns = list[Turn]()
         self.failed = ""
@@ -84,8 +85,7 @@ class Modes:
         return self._slid(self.values)
 
     def _slid(self, modes: Sequence[float] | Array) -> Flags:
-        halves = (np.array(modes) - 1.0) / self._spacing
-        return np.asarray(halves != np.floor(halves))
+        return np.asarray((np.array(modes) - 1.0) / self._spacing % 1.0 != 0.0)
 
     @property
     def problem(self) -> Problem:
@@ -152,7 +152,7 @@ class Modes:
         if not near.any() or self.slid.any():
             return None
         number = int(np.argmax(near))
-        normal = _slopes(watched.part(number).values, point[:, 0], len(x))[:-1]
+        normal = _slopes(watched.part(number, number + 1).values, point[:, 0], len(x))[:-1]
         return number, x - outputs_of(watched.values, point)[number, 0] * normal / (normal @ normal)
 
     def nears(self, t: float, x: Array, p: Sequence[float], h: float) -> bool:
@@ -234,11 +234,6 @@ class Modes:
                 found.append((k, ways[0]))
         return found
 
-    @property
-    def words(self) -> tuple[str, ...]:
-        """The surfaces as formulas."""
-        return self._switches.words
-
 
 @dataclass(eq=False)
 class _Choice:
@@ -252,7 +247,6 @@ class _Choice:
     _middle: Array
     _half: Array
     _crossed: Array
-    _known: dict[tuple[int, ...], tuple[Array, Array]] = field(default_factory=dict)  # by order, and sides
 
     def found(self) -> Array | None:
         """Modes that hold; None if none do."""
@@ -274,45 +268,43 @@ class _Choice:
     def _modes(self, sides: Sequence[int]) -> Array:
         return np.asarray(self._middle + self._half * np.array(sides))
 
-    def _derivatives(self, order: int, sides: Sequence[int]) -> tuple[Array, Array]:
+    @kept_by_first
+    def _derivatives(self, order: int, sides: tuple[int, ...]) -> tuple[Array, Array]:
         """Derivatives of the gaps by time with these sides, none of which is 0, and what of it is rounding, (n,) each.
 
         Of order 1 or 2; 3 stands for the first ones a little later.
         """
-        key = order, *sides
-        if key not in self._known:
-            t, x, sizes, modes = self._t, self._x, self._of.sizes, self._of.values.copy()
-            modes[self._among] = self._modes(sides)
-            fixed = np.array([*self._p, *modes])
-            if order == LATER:
-                rate = outputs_of(self._of.plain.rate, np.concatenate([x, [t], fixed])[:, None])[: len(x), 0]
-                moves = (sizes > 0.0) & (rate != 0.0)
-                if moves.any():
-                    after = self._of.direction * AHEAD * float(np.median(sizes[moves] / np.abs(rate[moves])))
-                    x, t = x + after * rate, t + after
-            m = len(x)  # of a state, its components to both sides and in turn
-            ways = np.array([[0.0] * m, [1.0] * m, [1.0 if k % 2 else -1.0 for k in range(m)]]).T
-            states = x[:, None] + AT_ONCE * sizes[:, None] * ways
-            fixed = np.concatenate([[t], fixed])[:, None]
-            points = np.concatenate([states, np.broadcast_to(fixed, (len(fixed), ways.shape[1]))])
-            values = outputs_of(_drift(self._of.plain, 2 if order == 2 else 1), points)[self._among]
-            values *= 1.0 if order == 2 else self._of.direction
-            off = 4.0 * np.abs(values[:, 1:] - values[:, :1]).max(axis=1) + 16.0 * UNIT * np.abs(values[:, 0])
-            self._known[key] = values[:, 0], off
-        return self._known[key]
+        t, x, sizes, modes = self._t, self._x, self._of.sizes, self._of.values.copy()
+        modes[self._among] = self._modes(sides)
+        fixed = np.array([*self._p, *modes])
+        if order == LATER:
+            rate = outputs_of(self._of.plain.rate, np.concatenate([x, [t], fixed])[:, None])[: len(x), 0]
+            moves = (sizes > 0.0) & (rate != 0.0)
+            if moves.any():
+                after = self._of.direction * AHEAD * float(np.median(sizes[moves] / np.abs(rate[moves])))
+                x, t = x + after * rate, t + after
+        m = len(x)  # of a state, its components to both sides and in turn
+        ways = np.array([[0.0] * m, [1.0] * m, [1.0 if k % 2 else -1.0 for k in range(m)]]).T
+        states = x[:, None] + AT_ONCE * sizes[:, None] * ways
+        fixed = np.concatenate([[t], fixed])[:, None]
+        points = np.concatenate([states, np.broadcast_to(fixed, (len(fixed), ways.shape[1]))])
+        values = outputs_of(_drift(self._of.plain, 2 if order == 2 else 1), points)[self._among]
+        values *= 1.0 if order == 2 else self._of.direction
+        off = 4.0 * np.abs(values[:, 1:] - values[:, :1]).max(axis=1) + 16.0 * UNIT * np.abs(values[:, 0])
+        return values[:, 0], off
 
     @cached_property
     def _rests(self) -> list[Flags]:
         """Whether the first derivative of each gap, and also the second, is zero on both sides of all surfaces."""
         n, result = len(self._among), list[Flags]()
         for order in (1, 2):
-            found = [self._derivatives(order, [side] * n) for side in (-1, 1)]
+            found = [self._derivatives(order, (side,) * n) for side in (-1, 1)]
             result.append(np.logical_and.reduce([*result, *[np.abs(value) <= off for value, off in found]]))
             if not result[0].any():
                 break
         return result
 
-    def _motions(self, sides: Sequence[int]) -> tuple[Array, Array]:
+    def _motions(self, sides: tuple[int, ...]) -> tuple[Array, Array]:
         """The first derivatives of the gaps that are not zero on all sides, and what of them is rounding."""
         value, off = self._derivatives(1, sides)
         for order, rests in enumerate(self._rests, 2):
@@ -322,14 +314,14 @@ class _Choice:
                 ]
         return value, off
 
-    def _wrong(self, sides: Sequence[int]) -> list[tuple[int, int]]:
+    def _wrong(self, sides: tuple[int, ...]) -> list[tuple[int, int]]:
         """Surfaces that do not let the motion go on with these sides, and where they send it."""
-        base = [side or -1 for side in sides]
+        base = tuple([side or -1 for side in sides])
         slides = [k for k, side in enumerate(sides) if side == 0]
         drift, off = self._motions(base)
         wrong = list[tuple[int, int]]()
         if slides:
-            columns = [self._motions([*base[:k], 1, *base[k + 1 :]])[0] - drift for k in slides]
+            columns = [self._motions((*base[:k], 1, *base[k + 1 :]))[0] - drift for k in slides]
             matrix = np.array(columns).T
             with np.errstate(all="ignore"):
                 shares = np.linalg.lstsq(matrix[slides], -drift[slides], rcond=None)[0]
@@ -352,7 +344,7 @@ class _Choice:
         """Sides by pivots: the first that is wrong slides, or leaves its slide."""
         sides = [0 if not crossed else want for want, crossed in zip(wanted, self._crossed, strict=True)]
         for _ in range(ROUNDS * len(sides)):
-            wrong = self._wrong(sides)
+            wrong = self._wrong(tuple(sides))
             if not wrong:
                 return self._modes(sides)
             k, way = min(wrong)
@@ -366,19 +358,19 @@ def entries(modes: Modes, before: Turn, after: Turn, point: Array) -> tuple[Grap
     Motions nearby cross them one after another. Where none hastens another, the second is crossed dt = -g / g' later,
     so that the state after it is x + (f_between - f_after) dt. Raises ValueError where one does: motions nearby part.
     """
+
+    def turned(sides: Sequence[float], k: int) -> list[float]:
+        return [*sides[:k], after.modes[k], *sides[k + 1 :]]
+
     first, *others = modes.crossed(before, after)
-    between = list(before.modes)
-    between[first[0]] = after.modes[first[0]]
+    between = turned(before.modes, first[0])
     result = list[Graph]()
     for k, number in others:
         margin, own = modes.margin(before, number), modes.margin(before, first[1])
         if _is_same(margin, own, point) or not is_zero(margin, point, modes.sizes):
-            between[k] = after.modes[k]
+            between = turned(between, k)
             continue
-        following = [*between]
-        following[k] = after.modes[k]
-        alone = [*before.modes]
-        alone[k] = after.modes[k]
+        following, alone = turned(between, k), turned(before.modes, k)
         rates = [modes.rate(each) for each in (before.modes, between, alone, following)]
         f, f_between, f_alone, _ = [values_of(rate, point, 1)[:, 0] for rate in rates]
         if not (_moves_alike(margin, point, f, f_between) and _moves_alike(own, point, f, f_alone)):

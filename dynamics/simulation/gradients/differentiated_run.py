@@ -215,10 +215,7 @@ class DifferentiatedRun:
                 self._require_solved(failed)
             t_bar = vectors.get("t", np.zeros((1, motions.many)))
             if total is not None and rows.size:
-                if steps.rows is None:
-                    total += rows[:, :forces]
-                else:
-                    np.add.at(total, steps.rows, rows[:, :forces])
+                np.add.at(total, np.arange(len(rows)) if steps.rows is None else steps.rows, rows[:, :forces])
             if k:
                 # cotangents of the instants and lengths of the steps, to which the event adds at the last
                 t, h = rows[:, -2:, 0].T.copy()

@@ -24,7 +24,7 @@ from ..trajectory import SimulationWarning
 from .differentiated_run import DifferentiatedRun
 from .doubts import doubts, loss_doubts
 from .motion_programs import outputs_at
-from .motions import TORQUE, Differentiation, Loss, Motions
+from .motions import TORQUE, Loss, Motions, motions_of
 
 FEW_MOTIONS = 4  # motions: fewer by a method that iterates are done sooner one by one
 WIDE_BLOCK = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
@@ -146,8 +146,7 @@ def gradient(
     >>> round(result.value, 6), result["q"].round(6).tolist(), result["tau"].shape
     (-0.403412, [-0.880376], (100, 1))
     """
-    losses = loss, running
-    motions = Differentiation(model, losses, t_end, method, tau, parameters, wrt, events, options)(q, qd)
+    motions = motions_of(model, q, qd, (loss, running), t_end, method, tau, parameters, wrt, events, options)
     run, values, slopes, said = _gradients(motions)
     for text in said[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
@@ -205,8 +204,7 @@ def gradient_many(
     >>> fan["q"].round(4).tolist(), fan.value.shape
     ([[-0.8804], [-1.1123], [-0.595]], (3,))
     """
-    losses = loss, running
-    motions = Differentiation(model, losses, t_end, method, tau, parameters, wrt, (), options, many=True)(q, qd)
+    motions = motions_of(model, q, qd, (loss, running), t_end, method, tau, parameters, wrt, (), options, many=True)
     count, problem, settings = motions.many, motions.problem, motions.options
     values, end, checkpoints = np.full(count, np.nan), np.full((count, problem.size), np.nan), 0
     nothing = motions.by_names(np.full_like(motions.point(motions.x, 0.0), np.nan))
@@ -358,7 +356,7 @@ def sensitivities(
     >>> result["m"][[100, 200]].round(4).tolist()
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
-    motions = Differentiation(model, (None, None), t_end, method, tau, parameters, wrt, events, options)(q, qd)
+    motions = motions_of(model, q, qd, (None, None), t_end, method, tau, parameters, wrt, events, options)
     if motions.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motions.tau.shape[:-1]}: gradient takes a row a step")
     run = DifferentiatedRun(motions, forwards=True)

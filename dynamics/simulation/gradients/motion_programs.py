@@ -17,12 +17,13 @@ from cgraph import Graph, Node
 from cgraph._shared import Along, Array, Passes, adjoint, kept_by_first, memo, tangent
 from cgraph.extend import STATEMENTS, Builder, Call, Map, Program, Statement, folded, topological
 
-from ...equations.substitute import substitute
 from ...integrators import Method, Problem
 from ...integrators.rate_in_modes import sliding
 from ...integrators.step import with_registers
 from ...integrators.step_control import equal_registers
 from ...systems.arguments import TIME, new_variables
+from ...systems.evaluation import ByRows
+from ...systems.kinematics import substitute
 from ..steps.row_values import compiled
 from ..steps.step_program import normalizing
 from .rate_pullback import RatePullback, rate_pullback, sharing
@@ -67,6 +68,8 @@ class MotionEquations:
 @kept_by_first
 def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     """The equations of a problem whose first `forces` parameters are applied forces."""
+    if isinstance(problem.rate, ByRows):
+        return MotionEquations(problem, forces, problem.parameters[forces:], None, None, None, None)
     switches, open_count = problem.switches, len(problem.parameters)
     modes = () if switches is None else switches.modes
     names, rule = problem.parameters[forces : open_count - len(modes)], None if modes else rate_pullback(problem)
@@ -174,7 +177,8 @@ def motion_programs(
                 body[k] = Call(shared, each.inputs, (*each.outputs, f"shared{k}"))
     make = partial(Passes, constant=(*made.fixed, "evaluations", "nonfinite"))
     fed = ("t", "h", "tau") if each_step else ("t", "h")
-    step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, wrt)
+    tables = problem.evaluation.shared
+    step = make(Program(lengths, _separate(body), record=(), feed=fed, shared=tables), carried, wrt)
     if forwards:
         then = [Map(_LATER, ("t:dot", "h:dot"), ("t:dot",))] if {"t", "h"} <= set(wrt) else []
         linear = tangent(step, ["x"], then)
@@ -183,7 +187,7 @@ def motion_programs(
     first = None
     if begin := _separate([*normalizing(problem, TIME), *made.start]):
         read = [name for name in (*step.handed, *step.constants) if name not in INPUTS]
-        start = make(Program(lengths, begin, record=()), read, [name for name in wrt if name != "h"])
+        start = make(Program(lengths, begin, record=(), shared=tables), read, [name for name in wrt if name != "h"])
         seeds = [name for name in linear.vectors if name in start.handed]
         first = Along(start, tangent(start, ["x"]) if forwards else adjoint(start, seeds, at_start), read, backend)
     results = [name for name in ("x", LOSS, made.failed) if name in step.handed]

@@ -15,19 +15,19 @@ from cgraph import Graph, Node
 from cgraph._shared import Array, entry, is_function, kept_by_first, memo, real_array, require_sequence
 from cgraph.extend import Builder, topological
 
-from ...equations.state_equation import FORMS, StateInputs, state_inputs
+from ...equations.state_equation import FORMS, state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Problem, derive, in_form, quantity, quantity_inputs
 from ...integrators.rate_in_modes import switched
 from ...systems.arguments import TIME, Parameters, call_user_function
+from ...systems.kinematics import numbered_graph
 from ...systems.model import Equations, Model, as_equations
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System
-from ..applied_force import Hold, SampledController
+from ..applied_force import Hold, SampledController, with_applied
 from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.modes import Modes, Turn, entries, is_zero
 from ..outcome import MotionError, Recorder
-from ..run import Run
 from ..run_options import METHOD, Options, Span, Steps, known_options, time_span
 from ..stepper import Stepper, stepper_of
 from ..steps.dense_output import Indices
@@ -275,95 +275,89 @@ def _turn_at(turns: Sequence[Turn], t: float) -> Turn:
     return at[-1]._replace(number=at[0].number)
 
 
-class Differentiation:
-    """A run, its losses and what to differentiate by; a call makes its motions from starts.
+def motions_of(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    losses: tuple[Loss | None, Loss | None],
+    t_end: float | None,
+    method: str | None,
+    tau: Any,
+    parameters: Mapping[str, ArrayLike] | None,
+    wrt: str | Iterable[str] | None,
+    events: Event | Iterable[Event],
+    options: Options,
+    *,
+    many: bool = False,
+) -> Motions:
+    """The motions from starts.
 
     losses: of the end, and of each step.  many: N motions, else one, whose arguments have no axis N.
     """
+    if isinstance(tau, SampledController):
+        cause = "a SampledController calls Python, which has no derivative"
+        raise TypeError(f"tau must be numbers or a controller in closed form: {cause}")
+    watched, closed, form = as_events(events), is_function(tau), options.pop("form", FORMS[0])
+    own = _with_loss_parameters(as_equations(model), parameters, *losses)
+    t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
+    rows = None if closed else real_array("tau", tau)
+    rows = rows if rows is not None and rows.ndim == 2 + many else None
+    if method is None:
+        method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
+    plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
+    steps, span = (_options if plain else _options.__wrapped__)(t_end, method, t0, *options.items())
+    if rows is not None:
+        _require_rows(rows, len(state_inputs(own).applied), steps, span, many=many, watched=bool(watched))
+        rows = rows if many else rows[None]
+    applied = with_applied(own, tau if rows is None else 0.0, parameters)
 
-    def __init__(
-        self,
-        model: Model,
-        losses: tuple[Loss | None, Loss | None],
-        t_end: float | None,
-        method: str | None,
-        tau: Any,
-        parameters: Mapping[str, ArrayLike] | None,
-        wrt: str | Iterable[str] | None,
-        events: Event | Iterable[Event],
-        options: Options,
-        *,
-        many: bool = False,
-    ) -> None:
-        if isinstance(tau, SampledController):
-            cause = "a SampledController calls Python, which has no derivative"
-            raise TypeError(f"tau must be numbers or a controller in closed form: {cause}")
-        self._losses, self._parameters, self._wrt, self._events = losses, parameters, wrt, as_events(events)
-        self._many, self._closed, self._form = many, is_function(tau), options.pop("form", FORMS[0])
-        own = _with_loss_parameters(as_equations(model), parameters, *losses)
-        t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
-        rows = None if is_function(tau) else real_array("tau", tau)
-        rows = rows if rows is not None and rows.ndim == 2 + many else None
-        if method is None:
-            method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
-        plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
-        steps, self._span = (_options if plain else _options.__wrapped__)(t_end, method, t0, *options.items())
-        if rows is not None:
-            _require_rows(
-                rows, len(state_inputs(own).applied), steps, self._span, many=many, watched=bool(self._events)
-            )
-        self._rows, self._options = rows if many or rows is None else rows[None], steps
-        self._run = Run(own, steps, tau if rows is None else 0.0, self._events, self._form, False, (), parameters)
+    # What stays an input, and the equations over these
+    inputs, constant = state_inputs(applied.model), applied.constant if rows is None or not many else rows[:, 0]
+    start = initial_values(applied.model, q, qd, constant, parameters, span.t0, many=many)
+    steps.check(span, start.states)
+    names, count = inputs.applied, len(start.x)
+    wanted = _names(wrt, [START, VELOCITY, TORQUE][: 3 - closed] if names else [START], inputs.parameters)
+    forced = rows is not None or TORQUE in wanted or not start.varied.keys().isdisjoint(names)
+    forces = names if forced or any([start.bound[name] != 0.0 for name in names]) else ()
+    free = {*forces, *wanted, *(parameters or ())}  # what a caller changes from call to call stays an input
+    known = {name: value for name, value in start.bound.items() if name not in free}
+    problem = switched(in_form(derive(applied.model, known, by_rows=steps.integrator.by_rows), form))
+    equations, columns = motion_equations(problem, len(forces)), start.bound | start.varied
+    problem = equations.problem
 
-    def __call__(self, q: ArrayLike, qd: ArrayLike | None) -> Motions:
-        """The motions."""
-        run, options, span, rows = self._run, self._options, self._span, self._rows
-        inputs = state_inputs(run.applied.model)
-        constant = rows[:, 0] if self._many and rows is not None else run.applied.constant  # of rows the first ones
-        start = initial_values(run.applied.model, q, qd, constant, self._parameters, span.t0, many=self._many)
-        options.check(span, start.states)
-        wrt, names, count = self._names(inputs), inputs.applied, len(start.x)
-        forced = rows is not None or TORQUE in wrt or not start.varied.keys().isdisjoint(names)
-        forces = names if forced or any([start.bound[name] != 0.0 for name in names]) else ()
-        free = {*forces, *wrt, *(self._parameters or ())}  # what a caller changes from call to call stays an input
-        derived = derive(run.applied.model, {name: value for name, value in start.bound.items() if name not in free})
-        problem = switched(in_form(derived, self._form))
-        equations, columns = motion_equations(problem, len(forces)), start.bound | start.varied
-        numbers = np.empty((len(forces) + len(equations.names), count))
-        for row, name in zip(numbers, [*forces, *equations.names], strict=True):
-            row[:] = columns[name]
-        tau, values, problem = numbers[: len(forces)], numbers[len(forces) :], equations.problem
-        if rows is not None:
-            tau = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
-        if equations.numbers is not None:
-            values = outputs_at(equations.numbers, options.backend, values)
-        values = np.concatenate([values, np.ones((equations.modes, count))])
-        final = _loss_graph(problem, "loss", self._losses[0])
-        running = _loss_graph(problem, "running", self._losses[1], run.applied.nodes)
-        watched = event_program(problem, self._events) if self._events else None
-        steps: tuple[Stretch, ...] = ()
-        if not (options.adaptive or watched or equations.modes):
-            by_rows = rows is not None and options.dt is None
-            steps_count = len(tau) if by_rows else step_count(span.length, options.step)
-            entry = () if equations.start is None else (equations.start,)
-            steps = (_equal_stretch(span.t0, span.t_end, steps_count)._replace(entry=entry),)
-        return Motions(equations, options, span, start.x.T.copy(), tau, values, wrt, final, running, watched, steps)
+    # Numbers, losses and steps
+    numbers = np.empty((len(forces) + len(equations.names), count))
+    for row, name in zip(numbers, [*forces, *equations.names], strict=True):
+        row[:] = columns[name]
+    force, values = numbers[: len(forces)], numbers[len(forces) :]
+    if rows is not None:
+        force = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
+    if equations.numbers is not None:
+        values = outputs_at(equations.numbers, steps.backend, values)
+    values = np.concatenate([values, np.ones((equations.modes, count))])
+    final = _loss_graph(problem, "loss", losses[0])
+    running = _loss_graph(problem, "running", losses[1], applied.nodes)
+    program = event_program(problem, watched) if watched else None
+    stretches: tuple[Stretch, ...] = ()
+    if not (steps.adaptive or program or equations.modes):
+        made = len(force) if rows is not None and steps.dt is None else step_count(span.length, steps.step)
+        entry = () if equations.start is None else (equations.start,)
+        stretches = (_equal_stretch(span.t0, span.t_end, made)._replace(entry=entry),)
+    return Motions(equations, steps, span, start.x.T.copy(), force, values, wanted, final, running, program, stretches)
 
-    def _names(self, inputs: StateInputs) -> tuple[str, ...]:
-        """Names to differentiate by: by default the start, and the applied force where it is numbers."""
-        usual = [START, VELOCITY, TORQUE][: 3 - self._closed] if inputs.applied else [START]
-        if self._wrt is None:
-            return tuple(usual)
-        names = [self._wrt] if isinstance(self._wrt, str) else require_sequence("wrt", self._wrt, "names")
-        known = dict.fromkeys([*usual, *inputs.parameters])
-        for name in names:
-            entry("wrt: the motion has no input", known, name)
-            if name in usual and name in inputs.parameters:
-                both = "the start or the applied force, and a parameter"
-                raise ValueError(f"wrt {name!r} is {both}: rename the parameter")
-        if not names:
-            raise ValueError(f"wrt needs at least one of {', '.join(usual)} and the parameters")
-        return tuple(dict.fromkeys(names))
+
+def _names(wrt: str | Iterable[str] | None, usual: Sequence[str], parameters: Iterable[str]) -> tuple[str, ...]:
+    """Names to differentiate by: by default the start, and the applied force where it is numbers."""
+    names = usual if wrt is None else [wrt] if isinstance(wrt, str) else require_sequence("wrt", wrt, "names")
+    known = dict.fromkeys([*usual, *parameters])
+    for name in () if wrt is None else names:
+        entry("wrt: the motion has no input", known, name)
+        if name in usual and name in parameters:
+            both = "the start or the applied force, and a parameter"
+            raise ValueError(f"wrt {name!r} is {both}: rename the parameter")
+    if not names:
+        raise ValueError(f"wrt needs at least one of {', '.join(usual)} and the parameters")
+    return tuple(dict.fromkeys(names))
 
 
 def _require_rows(rows: Array, n: int, options: Steps, span: Span, *, many: bool, watched: bool) -> None:
@@ -420,8 +414,7 @@ def _place(problem: Problem, key: str) -> list[Graph]:
 def _by_displacements(system: System) -> Graph:
     """(q, q_bar) -> G^T q_bar."""
     bars = cg.variables([f"bar{k}" for k in range(system.nq)])
-    pulled = system.kinematics.pulled_back(bars, Builder())
-    return Graph([*system.q, *bars], {f"{k}": node for k, node in enumerate(pulled)})
+    return numbered_graph([*system.q, *bars], system.kinematics.pulled_back(bars, Builder()))
 
 
 @memo(OPTIONS_KEPT)

@@ -17,10 +17,9 @@ from cgraph.extend import Builder, SingularError, building, cotangents, folded, 
 from ...equations.bias_terms import bias_terms
 from ...equations.constraints.constraints import constraint_rows
 from ...equations.mass_matrix.accelerations import DENSE_UP_TO
-from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.arguments import new_variables
-from ...systems.kinematics import numbered_graph
+from ...systems.kinematics import numbered_graph, substitute
 from ...systems.system import System
 
 ARITHMETIC = ("add", "sub", "mul", "neg")

@@ -58,14 +58,15 @@ def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: 
         found = [If("begins", (*begins, wish, sizes))]
     else:
         rate = _rate(problem, "x", "t", "rate_start")
-        found = [If("begins", (*begins, rate)), If("look", (If("sized", _look(problem, kinds, tolerance)), searched))]
+        found = [If("begins", (*begins, *rate)), If("look", (If("sized", _look(problem, kinds, tolerance)), searched))]
         after.append(If("search", _turn(problem.size, order), seldom=True))
     later = call(lambda seen: {"seen": 2.0 * seen, "due": 0.0})
     raised = (*tolerance, *_at_rest(kinds), copied("tolerance", "atol"), later)
     larger = each(lambda size, x: {"size": cg.maximum(size, _size(x))})
     after += [If("row", (larger,)), If("due", raised, seldom=True)]
     before = [If("anew", (*found, *_set_out(problem, AT_ONCE if starts else FIRST_LOOK)), seldom=True)]
-    first, last = (_of_start(part, {*registers(problem), "farthest"}) for part in (before, after))
+    shared = {*registers(problem), "farthest", *problem.evaluation.lengths}
+    first, last = (_of_start(part, shared) for part in (before, after))
     known = {**steps.registers, **{f"{START}{name}": 1 for name in GIVEN}, f"{START}so_far": problem.size}
     return replace(steps, registers=lengths_of([*first, *last], known), body=[*first, *steps.body, *last])
 
@@ -76,8 +77,7 @@ def _of_start(statements: Sequence[Statement], shared: Collection[str]) -> tuple
     for statement in statements:
         row = STATEMENTS[type(statement)]
         bodies: dict[str, Any] = {body: _of_start(getattr(statement, body), shared) for body in row.bodies}
-        fields = dict.fromkeys([*row.reads, *row.writes])
-        named = with_names(statement, fields, lambda name: name if name in shared else f"{START}{name}")
+        named = with_names(statement, lambda name: name if name in shared else f"{START}{name}")
         result.append(replace(named, **bodies))
     return tuple(result)
 
@@ -91,9 +91,9 @@ def _so_far(fine: Node, ahead: Node, x: Node, before: Node) -> Node:
     return cg.maximum(before, cg.where(fine, ahead, _size(x)))
 
 
-def _rate(problem: Problem, x: str, t: str, target: str) -> Call:
+def _rate(problem: Problem, x: str, t: str, target: str) -> list[Statement]:
     """A rate of which what cancels is 0: the looks ahead tell what rests from what moves."""
-    return Call(problem.rate, (x, t, "p"), (target,), exact=True)
+    return problem.evaluation.at(x, t, target, exact=True)
 
 
 def _tolerance(kinds: StateKinds) -> tuple[Statement, ...]:
@@ -210,7 +210,7 @@ def _euler(problem: Problem, kinds: StateKinds) -> tuple[Statement, ...]:
         copied("rate_ahead", "rate_before"),
         Call(kinds.largest, ("rate_ahead",), ("kind_before",)),
         call(lambda t0, turn, toward, reach: {"t_ahead": t0 + (turn + 1.0) * (toward * reach), "turn": turn + 1.0}),
-        _rate(problem, "x_ahead", "t_ahead", "rate_ahead"),
+        *_rate(problem, "x_ahead", "t_ahead", "rate_ahead"),
         Call(kinds.largest, ("rate_ahead",), ("kind_ahead",)),
         each(lambda rate_ahead, rate_before: {"change": rate_ahead - rate_before}),
         Call(kinds.largest, ("change",), ("change",)),

@@ -12,14 +12,24 @@ import cgraph as cg
 from cgraph import Graph, _shared
 from cgraph._shared import Array, kept_by_first
 
+from ...systems.evaluation import ByRows
+
 BLOCK = 4096  # rows that are taken at once
 
-compiled = kept_by_first(cg.compile)  # by a backend, once
 tangent = kept_by_first(cg.jvp)
+
+
+@kept_by_first
+def compiled(graph: Graph, backend: str = "auto") -> Any:
+    """The graph as a function, made once; one by rows is its own."""
+    return graph if isinstance(graph, ByRows) else cg.compile(graph, backend)
 
 
 def values_of(graph: Graph, inputs: Iterable[Any], *shape: int) -> Array:
     """The outputs of a graph, (k, *shape), at numbers or arrays for its inputs."""
+    if isinstance(graph, ByRows):
+        columns = np.stack([np.broadcast_to(each, shape) for each in inputs])
+        return graph.batch(columns.reshape(len(columns), -1)).reshape(-1, *shape)
     result = np.empty((len(graph.outputs), *shape))
     for k, value in enumerate(graph.evaluate(dict(zip(graph.input_names, inputs, strict=True))).values()):
         result[k] = value
@@ -39,12 +49,11 @@ def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayL
     *shape, m = states.shape
     rows, t, count = states.reshape(-1, m), np.broadcast_to(times, shape).reshape(-1), len(graph.inputs) - m - 1
     held = np.broadcast_to(parameters, (*shape, count)).reshape(len(rows), count)
-    result = np.empty((len(rows), len(graph.outputs)))
+    parts = [slice(start, start + BLOCK) for start in range(0, max(len(rows), 1), BLOCK)]
     with np.errstate(all="ignore"):
-        for start in range(0, len(rows), BLOCK):
-            part = slice(start, start + BLOCK)
-            result[part] = values_of(graph, [*rows[part].T, t[part], *held[part].T], len(t[part])).T
-    return result.reshape(*shape, len(graph.outputs))
+        values = [values_of(graph, [*rows[part].T, t[part], *held[part].T], len(t[part])).T for part in parts]
+    result = np.concatenate(values)
+    return result.reshape(*shape, result.shape[1])
 
 
 def origin(

@@ -15,6 +15,7 @@ from cgraph._shared import Array, rounding_noise
 
 from ...equations.state_equation import state_inputs
 from ...integrators import Problem
+from ...systems.evaluation import ByRows
 from ...systems.kinematics import numbered_graph
 from .row_values import values_of
 
@@ -57,7 +58,8 @@ class StateKinds:
         """Largest of the coordinates that velocities like this one move, of each component, (m) to (m); 0 of none."""
         x = self._variables
         weighed = [length * abs(size) for size, length in zip(x, self.lengths, strict=True)]
-        largest = {those: reduce(cg.maximum, [weighed[k] for k in those], cg.constant(0.0)) for those in self.moved}
+        kinds = dict.fromkeys(self.moved)
+        largest = {those: reduce(cg.maximum, [weighed[k] for k in those], cg.constant(0.0)) for those in kinds}
         return numbered_graph(
             x, [largest[those] / length for those, length in zip(self.moved, self.lengths, strict=True)]
         )
@@ -109,7 +111,8 @@ def with_floor(kinds: StateKinds, problem: Problem) -> StateKinds:
     point = dict.fromkeys(problem.rate.input_names, 0.0)
     point |= {name: float(known[name]) for name in problem.parameters if name in known}
     point |= dict(zip(problem.states, problem.system.kinematics.neutral, strict=False))
-    rates, pushed = rounding_noise(problem.rate, point)
+    rate = problem.rate
+    rates, pushed = rate.noise(point) if isinstance(rate, ByRows) else rounding_noise(rate, point)
     rests = np.isfinite(pushed) & (np.abs(rates) <= MOVES * pushed) & (np.arange(problem.size) >= nq)
     pushed = np.where(rests, pushed, 0.0)
     if not pushed.any():

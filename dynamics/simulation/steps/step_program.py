@@ -70,7 +70,8 @@ class CompiledSteps:
     def places(self) -> dict[str, int]:
         """Where in a memory the registers of one number are."""
         numbers = np.arange(float(self.runner.size))
-        single = [name for name, length in self.program.steps.registers.items() if length == 1]
+        steps = self.program.steps
+        single = [name for name, length in steps.registers.items() if length == 1 and name not in steps.shared]
         return {name: int(self.runner.read(numbers, name)[0]) for name in single}
 
     @cached_property

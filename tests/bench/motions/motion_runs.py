@@ -11,7 +11,7 @@ import numpy as np
 
 from cgraph._shared import Array
 from dynamics.experiments.accuracy_task import AccuracyTask
-from dynamics.experiments.work_precision.trajectory_runs import Outcome, Run
+from dynamics.experiments.work_precision.measurement import Outcome, Run
 from dynamics.integrators import METHODS
 from dynamics.simulation.ensembles.simulate_many import simulate_many
 from dynamics.simulation.simulate import prepare

@@ -13,11 +13,11 @@ import numpy as np
 import cgraph as cg
 from cgraph._shared import Array
 from dynamics.experiments.accuracy_task import AccuracyTask
-from dynamics.experiments.stability.cases.orbits import kepler
-from dynamics.multibody.builders.planar_arm import planar_arm
+from dynamics.experiments.stability.cases.rotation import kepler
+from dynamics.multibody.builders import planar_arm
 from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.multiprecision import Reference
-from dynamics.multiprecision.solution import from_text
+from dynamics.multiprecision.reference import from_text
 from dynamics.systems.ode_system import OdeSystem
 from dynamics.systems.system import System
 from tests.bench.speed.scenes import free_tree, turned_arm

@@ -19,8 +19,8 @@ import numpy as np
 from cgraph._shared import Array
 from dynamics.experiments.accuracy_task import AccuracyTask
 from dynamics.experiments.text_table import WIDTH, check_names, table
-from dynamics.experiments.work_precision.measurement import EndMetrics, Entry, ErrorMetrics, Tried, sweep, time_in_turns
-from dynamics.experiments.work_precision.trajectory_runs import CHOSEN, problem_of
+from dynamics.experiments.work_precision import measurement
+from dynamics.experiments.work_precision.measurement import CHOSEN, Entry, ErrorMetrics, ErrorOf, Tried, problem_of
 from dynamics.integrators import METHODS, Problem
 from dynamics.multiprecision import Reference
 from tests.bench.motions.motion_runs import HeyokaBatch, Many, ManyEnds, Motion
@@ -144,7 +144,7 @@ def motions(
                     continue
                 metrics = ErrorMetrics(replace(task, t_end=t_end), end)
                 solvers = [solver.until(t_end) for solver in solvers]
-                entries = [_swept(solver, metrics, limit, say) for solver in solvers]
+                entries = [_swept(solver, metrics.at_end, limit, say) for solver in solvers]
                 doubt = doubted(entries, end.error, metrics.scales[0])
                 rows = [Row(name, t_end, error, missed=dict(absent), doubt=doubt) for error in wanted]
                 _fill(rows, entries, repeats)
@@ -177,13 +177,13 @@ def methods(stiff: bool) -> list[str]:
     return [name for name, method in METHODS.items() if method.adaptive and (stiff or name not in STIFF)]
 
 
-def _swept(solver: EndSolver, metrics: EndMetrics, limit: float, say: Callable[[str], None]) -> Entry[EndSolver]:
+def _swept(solver: EndSolver, error_of: ErrorOf, limit: float, say: Callable[[str], None]) -> Entry[EndSolver]:
     """The runs of a solver on its ladder. What a run says of itself is not printed."""
     say(f"{solver.task.name} to {solver.task.t_end:g} s: {solver.name}")
     knobs = STEPS if solver.kind != CHOSEN else COARSER if group(solver.name) == HEYOKA else LADDER
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return sweep(solver, metrics, limit if solver.ours else PATIENCE * limit, knobs)
+        return measurement.sweep(solver, error_of, limit if solver.ours else PATIENCE * limit, knobs)
 
 
 def doubted(entries: Sequence[Entry[EndSolver]], error: float, size: Array) -> str:
@@ -221,7 +221,7 @@ def _fill(rows: Sequence[Row], entries: Sequence[Entry[EndSolver]], turns: int) 
             one.run.processor.append(one.once.processor)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        time_in_turns([one for one in runs.values() if not one.run.seconds], turns)
+        measurement.time_in_turns([one for one in runs.values() if not one.run.seconds], turns)
     for row in rows:
         for entry in entries:
             name = group(entry.solver.name)
@@ -283,7 +283,7 @@ def _ensemble(
         warnings.simplefilter("ignore")
         tightest = Many("radau" if task.stiff else "taylor", task, starts).ready(TIGHTEST)()
     metrics = ManyEnds(tightest.x, np.where(size > 0.0, size, 1.0))
-    entries = [_swept(solver, metrics, 4.0 * LONG_ENSEMBLE, say) for solver in many]
+    entries = [_swept(solver, metrics.at_end, 4.0 * LONG_ENSEMBLE, say) for solver in many]
     rows = [Row(task.name, task.t_end, row.error, n) for row in once]
     _fill(rows, entries, min(turns, 2))
     yield from rows

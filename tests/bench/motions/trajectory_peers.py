@@ -15,7 +15,7 @@ import numpy as np
 import cgraph as cg
 from cgraph._shared import Array
 from dynamics.experiments.accuracy_task import AccuracyTask
-from dynamics.experiments.work_precision.trajectory_runs import EQUAL, LONGEST_RUN, Outcome, Run, Solver
+from dynamics.experiments.work_precision.measurement import EQUAL, LONGEST_RUN, Outcome, Run, Solver
 from dynamics.integrators import Problem
 from dynamics.systems.arguments import TIME
 from dynamics.verification.residual import UnavailableError

@@ -61,12 +61,12 @@ class Ours(Peer):
         return TimedTask(function.bind(self.case.point(task), y), lambda _: y.copy(), size)
 
     def _jacobian(self) -> TimedTask:
-        """Derivatives of a large model by `bind_jacobian` of forward dynamics, by displacements."""
-        function, n = cg.compile(self.case.bound(self.rows.graph)), self.case.n
+        """Derivatives of a large model by `bind_jacobian`, of sums of rows or of forward dynamics by displacements."""
+        function, wrt, n = cg.compile(self.case.bound(self.rows.graph)), self.rows.wrt, self.case.n
         point = self.case.point("derivatives")
-        x, rows = np.zeros(function.n_in), np.empty((function.n_out, 3 * n))
+        x, found = np.zeros(function.n_in), np.empty((function.n_out, len(wrt)))
         x[: len(point)] = point
-        run = function.bind_jacobian(x, rows, wrt=self.rows.wrt)
+        run, rows = function.bind_jacobian(x, found, wrt=wrt), found.T if self.rows.turned else found
         return TimedTask(run, lambda _: rows[-n:].ravel(), len(function.graph.nodes))
 
     def _many(self) -> TimedTask:

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from cgraph._shared import Array
-from dynamics.verification.pinocchio_bodies import PinocchioBodies
-from dynamics.verification.pinocchio_model import PinocchioModel, axes as axes_of
+from dynamics.verification.pinocchio_model import PinocchioBodies, PinocchioModel, axes as axes_of
 
 from .peer import BATCH, DERIVATIVES, Peer, PeerModel, TimedTask, UnavailableError, rk4_step
 

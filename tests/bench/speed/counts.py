@@ -24,7 +24,7 @@ from dynamics.experiments.stability.single_evaluations import by_centers
 from dynamics.experiments.timing import exponent
 from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.bodies.body import WORLD, Body, Joint
-from dynamics.multibody.builders.planar_arm import planar_arm, planar_links
+from dynamics.multibody.builders import planar_arm, planar_links
 from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.systems.system import System
 from tests.bench.tables import Table

@@ -13,9 +13,9 @@ from cgraph._shared import Array
 from dynamics.equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from dynamics.equations.linearization.linearization import linearize_many
 from dynamics.experiments.timing import Made, spent
-from dynamics.multibody.builders.planar_arm import planar_arm
+from dynamics.multibody.builders import planar_arm
 from dynamics.multibody.trees.mechanism import Mechanism
-from dynamics.multiprecision.graph_values import values_in_digits
+from dynamics.multiprecision.decimal_numbers import values_in_digits
 from dynamics.systems.model import as_system
 from tests.bench.tables import Table, digits
 from tests.bench.timing import relative_difference, run_fresh

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from fractions import Fraction
 from functools import partial
 
 import mpmath
@@ -19,7 +18,6 @@ from cgraph.core.forward import tangents
 from cgraph.core.traversal import topological
 from tests.cgraph.engines import ENGINES
 from tests.each_row import each_row
-from tests.ldl import ldl_elimination
 from tests.tolerances import LONG_SUM
 
 # Each function runs on nodes and, with mpmath's functions, on high-precision numbers: {name: (function, inputs)}.
@@ -249,16 +247,6 @@ def test_turning_a_pair_back_costs_what_its_blocks_need() -> None:
         return len(cg.simplify(cg.Graph([a, *x], {f"s{i}": node for i, node in enumerate(solved)})).nodes)
 
     assert size() == 126
-
-
-def test_elimination_is_exact_over_fractions() -> None:
-    matrix = [[4, 1, 2], [1, 5, 3], [2, 3, 6]]
-    expected = [Fraction(1, 3), Fraction(-2, 7), Fraction(5)]
-    rhs = [sum(a * x for a, x in zip(row, expected, strict=True)) for row in matrix]
-    lower = [[Fraction(entry) for entry in row[: i + 1]] for i, row in enumerate(matrix)]
-    x, pivots = ldl_elimination(lower, rhs)
-    assert x == expected
-    assert pivots[0] * pivots[1] * pivots[2] == 70  # the determinant
 
 
 def saddle(n, m, seed=0, scale=1.0):

@@ -52,7 +52,7 @@ def sums_over_paths(graph: cg.Graph, point: dict[str, float]) -> tuple[np.ndarra
     value = list(cg.Graph(graph.inputs, partials).evaluate(point).values()) if partials else []
     entering: dict[cg.Node, list[tuple[cg.Node, float]]] = {node: [] for node in graph.nodes}
     for edge, p in zip(graph.edges, value, strict=True):
-        if not (edge.target.op.selects and p == 0.0) and edge.partial != 0.0 and partials_value(edge.partial) != 0.0:
+        if not (edge.target.op.selects and p == 0.0) and getattr(edge.partial, "value", edge.partial) != 0.0:
             entering[edge.target].append((edge.source, float(p)))
     shape = len(graph.outputs), len(graph.inputs)
     total, size, tame = np.zeros(shape), np.zeros(shape), np.ones(shape, dtype=bool)
@@ -70,10 +70,6 @@ def sums_over_paths(graph: cg.Graph, point: dict[str, float]) -> tuple[np.ndarra
                     sums[node] = sum(p * s for p, s, _ in terms), sum(abs(p) * a for p, _, a in terms)
             total[i, j], size[i, j] = sums.get(output, (0.0, 0.0))
     return total, size, tame
-
-
-def partials_value(partial: cg.Node | float) -> float | None:
-    return partial.value if isinstance(partial, cg.Node) else partial
 
 
 def every_jacobian(graph: cg.Graph, point: dict[str, float]) -> dict[str, np.ndarray]:

@@ -5,6 +5,7 @@ import math
 import re
 from dataclasses import replace
 from functools import partial
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -19,7 +20,6 @@ from tests.cgraph.codegen.test_c import CC, CXX, STRICT, WARNINGS, build, called
 from tests.cgraph.engines import evaluated, points_of
 from tests.each_row import each_row
 from tests.javascript import stepped_by_js
-from tests.registered import registered
 from tests.ulps import same
 
 X, Y, T = cg.variables("x y t")
@@ -167,7 +167,7 @@ def test_a_constant_too_small_for_float_does_not_vanish():
 def test_an_operation_without_a_text_in_c_is_an_error():
     """And no call of a function that there is not; one of <math.h> needs none, and a text of one's own is taken."""
     known = type(OPS["sin"])("bessel", 1, math.sin, np.sin, lambda y, a: (1.0,), ((0.3,),))
-    with registered(OPS, bessel=known), registered(ROWS, bessel=known):
+    with patch.dict(OPS, bessel=known), patch.dict(ROWS, bessel=known):
         graph = cg.Graph([X], {"y": apply(known, X)})
         with pytest.raises(ValueError, match=r"'bessel' has no text in C, and <math\.h> has no function bessel"):
             cg.to_c(graph)

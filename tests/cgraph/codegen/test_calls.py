@@ -192,11 +192,6 @@ def test_bound_functions_of_many_threads_do_not_meet(function):
         assert all(pool.map(calls, range(8)))
 
 
-def read_only(values):
-    values.flags.writeable = False
-    return values
-
-
 one, three = np.zeros(5), np.zeros(3)
 WRONG = {  # what is wrong: x, y, and what is said
     "x of another length": (np.zeros(2), three, r"x must be an array of float64 in shape \(3,\), got float64 \(2,\)"),
@@ -206,7 +201,7 @@ WRONG = {  # what is wrong: x, y, and what is said
     "x in another byte order": (np.zeros(3, ">f8"), three, "x must be an array of float64 .* got >f8"),
     "y with gaps": (three, np.zeros(6)[::2], r"y must be contiguous and aligned, got strides \(16,\)"),
     "x misaligned": (np.ndarray(3, np.float64, b"1" * 25, 1), three, "x must be contiguous and aligned"),
-    "y read-only": (three, read_only(np.zeros(3)), "y must be an array that can be written"),
+    "y read-only": (three, np.frombuffer(bytes(24)), "y must be an array that can be written"),
     "x and y in one place": (one[:3], one[2:], "x and y must not share memory"),
 }
 

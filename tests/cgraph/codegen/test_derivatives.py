@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph.codegen import parts
+from cgraph.codegen import schedule
 from cgraph.program.functions import compiled as functions, derivative
 from tests import high_precision
 from tests.each_row import each_row
@@ -313,7 +313,7 @@ def test_another_shape_is_an_error(backend):
 
 def test_long_graphs_pass_values_between_functions(monkeypatch):
     """Machine code divided every few steps has the numbers of Python."""
-    monkeypatch.setattr(parts, "STEPS", 7)
+    monkeypatch.setattr(schedule, "STEPS", 7)
     directions = np.random.default_rng(0).uniform(-1.0, 1.0, (17, 8))
     native, plain = compiled(example(), fma=False), compiled(example(), "python", fma=False)
     assert same(native.jvp(POINT, directions[:, :4]), plain.jvp(POINT, directions[:, :4]))

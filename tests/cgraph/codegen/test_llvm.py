@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 
 import cgraph as cg
-from cgraph.codegen import batch_ir, llvm_engine, parts
+from cgraph.codegen import batch_ir, llvm_engine, schedule
 from cgraph.codegen.llvm_ir import scalar_ir
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
@@ -106,7 +106,7 @@ def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch
     assert "@part1" not in batch_source(function)
     assert "@point.part1" not in function.source
     settings = {
-        "steps": (parts, "STEPS", 7),
+        "steps": (schedule, "STEPS", 7),
         "level 0": (llvm_engine, "QUICK", 3),
         "level 1": (llvm_engine, "SHORT", 3),
     }
@@ -128,10 +128,10 @@ def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch
 def test_outputs_that_are_constants_are_divided_among_functions():
     """LLVM takes a time that grows with the square of the stores in one of them."""
     x = cg.variable("x")
-    outputs = {f"{k}": cg.constant(float(k % 7)) for k in range(5 * parts.STEPS)} | {"y": x * x}
+    outputs = {f"{k}": cg.constant(float(k % 7)) for k in range(5 * schedule.STEPS)} | {"y": x * x}
     function = cg.compile(cg.Graph([x], outputs), "llvm")
-    assert max(part.count("store double") for part in function.source.split("define internal")) <= parts.STEPS + 1
-    assert function([3.0]).tolist() == [float(k % 7) for k in range(5 * parts.STEPS)] + [9.0]
+    assert max(part.count("store double") for part in function.source.split("define internal")) <= schedule.STEPS + 1
+    assert function([3.0]).tolist() == [float(k % 7) for k in range(5 * schedule.STEPS)] + [9.0]
 
 
 def test_constants_stand_in_a_table_and_divisors_in_instructions():
@@ -180,8 +180,8 @@ def test_auto_says_when_a_graph_is_too_large_for_machine_code(monkeypatch):
 def test_no_function_grows_with_the_graph(count):
     """On some graphs LLVM's time is quadratic in the length of a function."""
     functions = scalar_ir(long_chain(count)).split("define ")[1:]
-    assert max(len(function.splitlines()) for function in functions) < 4 * parts.STEPS
-    assert len(functions) > count // parts.STEPS
+    assert max(len(function.splitlines()) for function in functions) < 4 * schedule.STEPS
+    assert len(functions) > count // schedule.STEPS
 
 
 def test_fast_arithmetic_keeps_infinities_and_nan():

@@ -40,55 +40,41 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({}, "'sin' is in the table already, as one of the library's"),
+        ({"name": "sin"}, "'sin' is in the table already, as one of the library's"),
         ({"name": "my sine"}, "must be an identifier of Python, got 'my sine'"),
         ({"name": "lambda"}, "must be an identifier of Python, got 'lambda'"),
-        ({"name": "sine", "partials": None}, "operation 'sine': partials must be a function, got None"),
+        ({"partials": None}, "operation 'sine': partials must be a function, got None"),
         ({"name": "compile"}, "cannot be called 'compile', which means something else in cgraph"),
-        ({"name": "sine", "partials": lambda y, x: ()}, "'sine' takes 1 argument.s., its partials are 0"),
-        ({"name": "sine", "partials": lambda y, x: (x, x)}, "'sine' takes 1 argument.s., its partials are 2"),
-        ({"name": "sine", "partials": lambda y, x: x}, "'sine': partials must give a tuple, got <node variable"),
+        ({"partials": lambda y, x: ()}, "'sine' takes 1 argument.s., its partials are 0"),
+        ({"partials": lambda y, x: (x, x)}, "'sine' takes 1 argument.s., its partials are 2"),
+        ({"partials": lambda y, x: x}, "'sine': partials must give a tuple, got <node variable"),
+        ({"partials": lambda y, x: (cg.sine(y), 1.0)}, "'sine' takes 1 argument.s., its partials are 2"),
+        ({"partials": lambda y, x: (cg.sin(x),)}, "at x=0.3 its partial by x is 0.29552, where.*give 0.955336"),
+        ({"array": lambda x: 1.0 + np.sin(x)}, "at x=0.3 scalar is 0.29552 and array 1.29552"),
+        ({"array": math.sin}, "'sine': array must take and give arrays"),
+        ({"python": "({0}*{0})"}, "at x=0.3 scalar is 0.29552 and python 0.09"),
+        ({"numpy": "np.cos({0})"}, "at x=0.3 scalar is 0.29552 and numpy 0.955336"),
+        ({"python": "sinus({0})"}, "python must be an expression of Python: 'sinus.x0.' raises NameError"),
+        ({"numpy": "np.sin({0}"}, "numpy must be an expression of Python: .* raises SyntaxError"),
+        ({"python": "sin({1})"}, "'sine': python has the places .0., got 'sin.*1"),
+        ({"llvm": ("{y} = fneg {t} {0}",)}, "'sine': llvm has the places .0., .r., .t..*, got '.y. = "),
+        ({"interval": lambda x: (0.0, 0.1)}, "x=0.3 scalar is 0.29552, and for x in .0.3, 0.3. the interval"),
+        ({"interval": lambda x: (1.0, -1.0)}, "interval must give low <= high, got .1, -1. for x in .0.3, 0"),
+        ({"interval": lambda x: 1.0}, "interval must give two numbers for x in .0.3, 0.3."),
+        # Right at every point, and not between two:
         (
-            {"name": "sine", "partials": lambda y, x: (cg.sine(y), 1.0)},
-            "'sine' takes 1 argument.s., its partials are 2",
-        ),
-        (
-            {"name": "sine", "partials": lambda y, x: (cg.sin(x),)},
-            "at x=0.3 its partial by x is 0.29552, where.*give 0.955336",
-        ),
-        ({"name": "sine", "array": lambda x: 1.0 + np.sin(x)}, "at x=0.3 scalar is 0.29552 and array 1.29552"),
-        ({"name": "sine", "array": math.sin}, "'sine': array must take and give arrays"),
-        ({"name": "sine", "python": "({0}*{0})"}, "at x=0.3 scalar is 0.29552 and python 0.09"),
-        ({"name": "sine", "numpy": "np.cos({0})"}, "at x=0.3 scalar is 0.29552 and numpy 0.955336"),
-        (
-            {"name": "sine", "python": "sinus({0})"},
-            "python must be an expression of Python: 'sinus.x0.' raises NameError",
-        ),
-        ({"name": "sine", "numpy": "np.sin({0}"}, "numpy must be an expression of Python: .* raises SyntaxError"),
-        ({"name": "sine", "python": "sin({1})"}, "'sine': python has the places .0., got 'sin.*1"),
-        ({"name": "sine", "llvm": ("{y} = fneg {t} {0}",)}, "'sine': llvm has the places .0., .r., .t..*, got '.y. = "),
-        (
-            {"name": "sine", "interval": lambda x: (0.0, 0.1)},
-            "x=0.3 scalar is 0.29552, and for x in .0.3, 0.3. the interval",
-        ),
-        (
-            {"name": "sine", "interval": lambda x: (1.0, -1.0)},
-            "interval must give low <= high, got .1, -1. for x in .0.3, 0",
-        ),
-        ({"name": "sine", "interval": lambda x: 1.0}, "interval must give two numbers for x in .0.3, 0.3."),
-        (  # right at every point, and not between two
-            {"name": "sine", "interval": lambda x: (math.sin(x[0]), math.sin(x[0]))},
+            {"interval": lambda x: (math.sin(x[0]), math.sin(x[0]))},
             "x=0.3 scalar is 0.29552, and for x in .-2, 0.3. the interval",
         ),
-        ({"name": "sine", "arguments": "x y"}, "takes 1 argument.s., got the names 'x y'"),
-        ({"name": "sine", "samples": ()}, "needs samples of 1 number.s. each"),
-        ({"name": "sine", "samples": ((1.0, 2.0),)}, "needs samples of 1 number.s. each, got .*2.0"),
+        ({"arguments": "x y"}, "takes 1 argument.s., got the names 'x y'"),
+        ({"samples": ()}, "needs samples of 1 number.s. each"),
+        ({"samples": ((1.0, 2.0),)}, "needs samples of 1 number.s. each, got .*2.0"),
     ],
 )
 def test_a_row_that_does_not_fit_is_refused(change: dict[str, object], said: str) -> None:
     before = dict(OPS)
     with pytest.raises((TypeError, ValueError), match=said):
-        register(replace(OPS["sin"], domain=((0.0, 1.0),), **change))
+        register(replace(OPS["sin"], **{"name": "sine", "domain": ((0.0, 1.0),), **change}))
     assert before == OPS
     assert not hasattr(cg, "sine")
 

@@ -26,10 +26,6 @@ GRAPH = cg.Graph([x, y], {"f": x + y})
 assert issubclass(GraphError, ValueError)
 
 
-def evaluated(value: object) -> object:
-    return GRAPH.evaluate({"x": value, "y": 1.0})
-
-
 # {what is refused: (call of one wrong thing, the wrong things, the error, what it says)}
 REFUSED = {
     "a free variable": (lambda node: cg.Graph([x], {"f": node}), [x * z + y], GraphError, r"'y', 'z'.*\(x\)"),
@@ -60,7 +56,8 @@ REFUSED = {
         GRAPH.evaluate, [{"x": np.ones(2), "y": np.ones(3)}], GraphError, r"x \(2,\), y \(3,\)"
     ),
     "a value that is not real": (
-        evaluated, [1j, np.ones(2) * 1j, "1.0", None, np.array(["a"]), [None], x, object()], TypeError,
+        lambda value: GRAPH.evaluate({"x": value, "y": 1.0}),
+        [1j, np.ones(2) * 1j, "1.0", None, np.array(["a"]), [None], x, object()], TypeError,
         "input 'x' must be real numbers, got",
     ),
     "a constant that is NaN": (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.codegen.parts import STEPS
+from cgraph.codegen.schedule import STEPS
 from cgraph.extend import Call, If, Map, Program, Sum, While, runner
 from cgraph.program import fuse
 from tests.ulps import same

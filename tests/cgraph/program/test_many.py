@@ -155,10 +155,10 @@ def test_every_lane_has_pivots_of_its_own(backend: str, transposed: bool) -> Non
     assert rows[0, :, 0].tolist() == b[:, 0].tolist()
 
 
-def test_what_runs_one_memory_at_a_time_is_told() -> None:
+def test_what_runs_one_memory_at_a_time_is_told(backend: str) -> None:
     for control in ({"stop": "n"}, {"record_if": "n"}):
-        run = runner(Program({"n": 1}, [LESS], record=["n"], **control), "python")  # type: ignore[arg-type]
-        with pytest.raises(cg.GraphError, match=f"programs with {next(iter(control))} run one memory at a time"):
+        run = runner(Program({"n": 1}, [LESS], record=["n"], **control), backend)  # type: ignore[arg-type]
+        with pytest.raises(cg.GraphError, match=f"programs with {next(iter(control))} run one memory at a time, not"):
             run.run(np.zeros((1, 3)), 1)
 
 

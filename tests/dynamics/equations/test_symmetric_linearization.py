@@ -11,7 +11,7 @@ import dynamics as dyn
 from cgraph._shared import Array
 from cgraph.extend import Builder
 from dynamics import as_system
-from dynamics.equations.linearization.momentum_parts import momentum_parts
+from dynamics.equations.linearization.linearization_parts import momentum_parts
 from dynamics.equations.momentum.hamiltonian import velocities
 from tests import high_precision
 from tests.slow import slow
@@ -54,9 +54,8 @@ def free_base() -> dyn.Mechanism:
 
 def with_mass(mass: Any) -> dyn.Mechanism:
     """Two hinges, of which the second carries a parameter."""
-    bodies = list(random_mechanism(2, ["revolute"], 1).bodies)
-    bodies[1] = replace(bodies[1], mass=mass)
-    return dyn.Mechanism(bodies, parameters={mass: 1.7})
+    first, second = random_mechanism(2, ["revolute"], 1).bodies
+    return dyn.Mechanism([first, replace(second, mass=mass)], parameters={mass: 1.7})
 
 
 def square(graph: cg.Graph, at: dict[str, float], stem: str = "A") -> Array:

@@ -10,7 +10,7 @@ import dynamics as dyn
 from dynamics import torque_by_joint_motion, torque_by_link
 from dynamics.equations.states.evaluate import evaluate
 from dynamics.equations.torque_parts.torque_table import TorqueTable
-from dynamics.multibody.builders.planar_arm import planar_links
+from dynamics.multibody.builders import planar_links
 from tests.dynamics.mechanisms import FAMILIES, PLAIN, turned_tree
 from tests.dynamics.models import MODELS, at, random_arm, states
 from tests.slow import slow
@@ -51,14 +51,11 @@ def test_a_link_s_row_is_what_is_lost_without_the_link(k: int) -> None:
 
 def test_a_joint_feels_no_link_that_it_does_not_carry() -> None:
     """In a binary tree of 7, joint i carries link k if i is k or one of its ancestors."""
-    carried = np.zeros((7, 7), dtype=bool)
-    for k in range(7):
-        i = k
-        while True:
-            carried[k, i] = True
-            if i == 0:
-                break
-            i = (i - 1) // 2
+
+    def path(k: int) -> set[int]:
+        return {k} | (path((k - 1) // 2) if k else set())
+
+    carried = np.array([[i in path(k) for i in range(7)] for k in range(7)])
     table = torque_by_link(turned_tree(7))
     assert (table.zeros[:7] == ~carried).all()
     both = torque_by_joint_motion(turned_tree(7)).zeros[:, :7]

@@ -9,7 +9,7 @@ from cgraph.core.builder import folded
 from cgraph.core.traversal import topological
 from cgraph.extend import Builder
 from dynamics import bias
-from dynamics.equations.velocity_nodes import velocity_nodes
+from dynamics.equations.bias_terms import velocity_nodes
 from tests import high_precision
 
 N = 3

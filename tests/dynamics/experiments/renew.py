@@ -17,7 +17,7 @@ import dynamics as dyn
 from cgraph._shared import Array
 from dynamics.experiments.accuracy_task import KEPT_ENDS, AccuracyTask
 from dynamics.experiments.stability import cases
-from dynamics.experiments.work_precision.trajectory_runs import problem_of
+from dynamics.experiments.work_precision.measurement import problem_of
 from dynamics.multiprecision import Reference
 from tests.bench.motions import motion_scenes
 from tests.bench.motions.trajectory_peers import heyoka_equations

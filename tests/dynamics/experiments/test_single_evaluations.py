@@ -9,7 +9,7 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics.experiments.stability import single_evaluations
-from dynamics.multibody.builders.planar_arm import arm_of_links, planar_links
+from dynamics.multibody.builders import arm_of_links, planar_links
 from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import Array
 from tests.dynamics.tree_in_digits import tree_in_digits

@@ -146,7 +146,7 @@ def test_a_run_that_stops_meets_nothing(monkeypatch: MonkeyPatch) -> None:
     monkeypatch.setattr(case_runs, "MOST_STEPS", 10)
     found = case_runs.result(cases.load(SMOOTH), "dopri5")
     assert "max_steps" in found.stopped
-    assert not found.explained
+    assert found.verdict == "unexplained"
     assert {each.quantity for each in found.measurements if math.isnan(each.value)} == {"error"}
 
 
@@ -243,5 +243,5 @@ def test_a_quick_run_has_no_unexplained_row() -> None:
     said: list[str] = []
     found = stability.run(quick=True, say=said.append)
     assert len(said) == len(found)
-    assert [f"{each.case}, {each.method}" for each in found if not each.explained] == []
+    assert [f"{each.case}, {each.method}" for each in found if each.verdict == "unexplained"] == []
     assert {each.section for each in found} == set(stability.ABOUT)

@@ -14,9 +14,8 @@ from pytest import approx, raises
 import dynamics as dyn
 from dynamics.experiments.accuracy_task import INTERVALS, AccuracyTask
 from dynamics.experiments.work_precision import measurement
-from dynamics.experiments.work_precision.measurement import FLOOR_ERROR, ErrorMetrics
-from dynamics.experiments.work_precision.named_tasks import load, names
-from dynamics.experiments.work_precision.trajectory_runs import CHOSEN, EQUAL, Ours, Outcome, Run, Solver, problem_of
+from dynamics.experiments.work_precision.measurement import CHOSEN, EQUAL, FLOOR_ERROR, ErrorMetrics, Outcome, Solver
+from dynamics.experiments.work_precision.named_tasks import TASKS, load
 from dynamics.experiments.work_precision.work_precision import (
     Curve,
     Point,
@@ -105,7 +104,7 @@ def test_counts_are_those_of_a_simulation(report: WorkPrecision) -> None:
 def test_the_absolute_tolerance_goes_with_the_smallest_state() -> None:
     scene = dyn.scenes.load("spring_mass")
     found = load("spring_mass")
-    outcome = Ours("dop853", found, 1e-4, problem_of(found)).ready(1e-5)()
+    outcome = measurement.Ours("dop853", found, 1e-4, measurement.problem_of(found)).ready(1e-5)()
     run = dyn.simulate(scene, scene.q, scene.qd, T_END, "dop853", rtol=1e-5, atol=1e-9)
     assert (outcome.steps, outcome.evaluations) == (run.stats.steps, run.stats.nfev)
     assert outcome.steps != dyn.simulate(scene, scene.q, scene.qd, T_END, "dop853", rtol=1e-5, atol=1e-5).stats.steps
@@ -144,7 +143,7 @@ def test_targets_are_the_fastest_runs_that_are_good_enough() -> None:
         Curve("rk4", EQUAL, 4, None, "", (point(1e-2, 1.0), point(1e-7, 4.0))),
         Curve("dop853", CHOSEN, 8, None, "", (point(1e-7, 2.0), point(1e-13, 8.0))),
     ]
-    found = [(each.error, each.name, each.seconds) for each in targets(curves)]
+    found = [(each["error"], each["name"], each["seconds"]) for each in targets(curves)]
     assert found == [(1e-3, "dop853", 2.0), (1e-6, "dop853", 2.0), (1e-9, "dop853", 8.0), (1e-12, "dop853", 8.0)]
 
 
@@ -184,7 +183,7 @@ class Broken(Solver):
                 return Outcome(np.array([math.nan, 0.0]))
             return Outcome(np.array([math.cos(T_END), -math.sin(T_END)]) + knob, 1)
 
-        return Run(run)
+        return measurement.Run(run)
 
     def rows(self, knob: float) -> Any:
         if knob == 1e-2:
@@ -194,7 +193,7 @@ class Broken(Solver):
 
 def test_a_solver_that_fails_keeps_its_good_points_and_a_reason() -> None:
     found, metrics, smallest = task("spring_mass")
-    entry = measurement.sweep(Broken("broken", found, smallest), metrics, 1.0)
+    entry = measurement.sweep(Broken("broken", found, smallest), metrics.at_end, 1.0)
     assert [each.knob for each in entry.tried] == [1e-2, 1e-3]
     assert entry.stopped == "is not finite"
     assert entry.tried[0].error == approx(1e-2, rel=1e-2)
@@ -205,7 +204,7 @@ def test_a_solver_that_fails_keeps_its_good_points_and_a_reason() -> None:
 
 
 def test_settings() -> None:
-    assert {"kepler 0.3", "kepler 0.9", "robertson"} <= set(names())
+    assert {"kepler 0.3", "kepler 0.9", "robertson"} <= TASKS.keys()
     arm, planet, reaction = load("triple_pendulum"), load("kepler 0.9"), load("robertson")
     assert (arm.conservative, planet.conservative, reaction.conservative) == (False, True, False)
     assert not reaction.mechanical

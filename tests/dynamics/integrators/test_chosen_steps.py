@@ -18,10 +18,10 @@ from dynamics.simulation.run_options import Span, Steps
 from dynamics.simulation.stepper import stepper
 from dynamics.simulation.steps.step_program import compile_steps, step_program
 from tests.dynamics.linkages import windows
+from tests.dynamics.step_options import ADAPTIVE
 from tests.early_end import stops
 from tests.slow import slow
 
-ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 EXPLICIT = ["dopri5", "dop853"]
 STIFF = ["rodas", "radau"]
 NEAR = 1e-6  # relative, of the instant of a singularity

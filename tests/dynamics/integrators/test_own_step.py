@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -16,13 +17,12 @@ from cgraph.extend import Call
 from dynamics import METHODS
 from dynamics.integrators import Method, Problem, Step, call, each, measured
 from tests.dynamics.planet import PERIHELION, planet, position
+from tests.dynamics.step_options import ADAPTIVE
 from tests.each_row import each_row
-from tests.registered import registered
 
 OWN, EQUAL = "own", "own, equal"
 DRIVEN = dyn.OdeSystem(lambda x, t, p: [x[1], cg.cos(t) - p["k"] * cg.sin(x[0])], ["a", "b"], {"k": 2.0})
 START = [0.5, 0.1]
-ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 
 
 def parabola(problem: Problem) -> Step:
@@ -45,7 +45,7 @@ def parabola(problem: Problem) -> Step:
 
 @pytest.fixture(autouse=True)
 def own() -> Iterator[None]:
-    with registered(METHODS, **{OWN: Method(2, parabola, adaptive=True), EQUAL: Method(2, parabola)}):
+    with patch.dict(METHODS, **{OWN: Method(2, parabola, adaptive=True), EQUAL: Method(2, parabola)}):
         yield
 
 
@@ -92,7 +92,7 @@ def test_derivatives(method: str) -> None:
 def test_without_dense_output_of_its_own_it_is_the_cubic_through_states_and_rates() -> None:
     method = Method(2, lambda problem: replace(parabola(problem), dense=()), adaptive=True)
     times = np.linspace(0.0, 1.0, 14)
-    with registered(METHODS, cubic=method):
+    with patch.dict(METHODS, cubic=method):
         runs = [
             dyn.simulate(planet(), *PERIHELION, 1.0, name, rtol=1e-7, atol=1e-7, t_eval=times)
             for name in (OWN, "cubic")
@@ -122,7 +122,7 @@ def test_a_step_that_cannot_be_is_refused(changes: dict[str, Any], message: str,
         right = parabola(problem)
         return replace(right, **changes)
 
-    with registered(METHODS, wrong=Method(2, wrong, adaptive)):
+    with patch.dict(METHODS, wrong=Method(2, wrong, adaptive)):
         for run in (dyn.simulate, lambda *given: dyn.gradient(given[0], lambda x, t: x[0], *given[1:])):
             with raises(ValueError, match=message):
                 run(DRIVEN, START, None, 1.0, "wrong")
@@ -132,7 +132,7 @@ def test_a_step_that_cannot_be_is_refused(changes: dict[str, Any], message: str,
 def test_equal_steps_of_a_method_that_chooses_them(name: str) -> None:
     """Its order, of the one step; Taylor's method then takes the highest that it has."""
     given: dict[str, Any] = {"method": "equal", "estimate_error": False}
-    with registered(METHODS, equal=Method(METHODS[name].order, METHODS[name].step)):
+    with patch.dict(METHODS, equal=Method(METHODS[name].order, METHODS[name].step)):
         runs = [dyn.simulate(DRIVEN, START, None, 1.0, dt=dt, **given).q[-1] for dt in (0.25, 0.125)]
     errors = [abs(each - exact()).max() for each in runs]
     order = math.log2(errors[0] / errors[1]) if errors[1] > 1e-13 else math.inf
@@ -146,6 +146,6 @@ def test_equal_steps_see_forces_that_change_between_them(name: str) -> None:
     arm = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.cos(q[0]), ["a"])
     forces = {"tau": dyn.SampledController(lambda q, qd, t: [-40.0 * q[0] - 4.0 * qd[0]], 0.1)}
     exact = dyn.simulate(arm, [1.0], [0.0], 1.0, "dop853", rtol=1e-12, atol=1e-12, **forces).q[-1, 0]
-    with registered(METHODS, equal=Method(METHODS[name].order, METHODS[name].step)):
+    with patch.dict(METHODS, equal=Method(METHODS[name].order, METHODS[name].step)):
         run = dyn.simulate(arm, [1.0], [0.0], 1.0, "equal", dt=2e-3, estimate_error=False, **forces)
     assert run.q[-1, 0] == approx(exact, abs=1e-5)  # of a parabola; a slope from before the change is off by 1e-3

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from functools import partial
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -19,7 +20,6 @@ from dynamics.integrators.radau import _POWERS, _T, _T_INVERSE
 from dynamics.integrators.tableau import DOP853, PARTITIONED, TABLEAUS, Partitioned, Tableau
 from tests.dynamics.planet import PERIHELION, planet, position
 from tests.each_row import each_row
-from tests.registered import registered
 
 FITTED_ORDER = 0.05  # of a fitted order: what the next order adds at these steps
 EXACT = Fraction(1, 10**40)
@@ -131,7 +131,7 @@ def test_the_numbers_of_rodas() -> None:
 
 
 def test_a_tableau_alone_is_a_method_of_equal_steps() -> None:
-    with registered(METHODS, ralston=runge_kutta(RALSTON)):
+    with patch.dict(METHODS, ralston=runge_kutta(RALSTON)):
         ends = [dyn.simulate(planet(), *PERIHELION, 1.0, "ralston", dt=h).q[-1] for h in (1e-2, 5e-3)]
     errors = [np.abs(end - position(1.0)).max() for end in ends]
     assert math.log2(errors[0] / errors[1]) == approx(RALSTON.order, abs=FITTED_ORDER)
@@ -139,7 +139,7 @@ def test_a_tableau_alone_is_a_method_of_equal_steps() -> None:
 
 @pytest.fixture
 def own() -> Iterator[None]:
-    with registered(METHODS, bs23=runge_kutta(BOGACKI_SHAMPINE)):
+    with patch.dict(METHODS, bs23=runge_kutta(BOGACKI_SHAMPINE)):
         yield
 
 

@@ -9,7 +9,7 @@ import dynamics as dyn
 from dynamics import to_mjcf
 from dynamics.io.mujoco_module import mujoco
 from dynamics.io.mujoco_twin import MujocoTwin
-from dynamics.io.stand_ins import STAND_IN
+from dynamics.io.write_mjcf import STAND_IN
 from tests.dynamics.models import Array
 
 SAME_STEPS = 1e-10  # rad, rad/s: rounding of two codes grown by the motion over a second of RK4 steps

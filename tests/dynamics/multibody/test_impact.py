@@ -107,6 +107,6 @@ def test_a_scene_stands_for_its_mechanism() -> None:
     scene = dyn.scenes.load("triple_pendulum")
     shorter = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
     assert [len(part) for part in shorter.map_state_from(scene, scene.q, scene.qd)] == [2, 2]
-    assert dyn.RecursiveInverseDynamics(scene)(scene.q, scene.qd, [0.0] * 3).shape == (3,)
+    assert dyn.Rows(scene).inverse(scene.q, scene.qd, [0.0] * 3).shape == (3,)
     with raises(dyn.MechanismError, match="release takes rigid bodies, a Mechanism or a scene of one, got Scene"):
         dyn.release(dyn.scenes.load("spring_mass"), [0.0], [0.0], "a")

@@ -14,10 +14,6 @@ from tests.tolerances import LAST_BITS
 ROUNDING = 1e-11  # of the largest torque
 
 
-def screwed(kinds: tuple[str, ...]) -> dyn.Mechanism:
-    return random_mechanism(5, kinds, 2)
-
-
 def test_it_winds_along_its_axis() -> None:
     nut = dyn.Mechanism(
         [dyn.Body("nut", dyn.Joint("screw", (0.0, 0.0, 1.0), pitch=PITCH), mass=2.0, inertia=(1.0, 1.0, 0.5))]
@@ -31,7 +27,7 @@ def test_it_winds_along_its_axis() -> None:
 
 def test_screws_of_other_pitches_are_told_apart() -> None:
     """Also where mechanisms that derive from one another share the motions of their bodies."""
-    first = screwed(("screw",))
+    first = random_mechanism(5, ("screw",), 2)
     steeper = replace(first.bodies[2], joint=replace(first.bodies[2].joint, pitch=2.0 * PITCH))
     bodies = [*first.bodies[:2], steeper, *first.bodies[3:]]
     derived, fresh = replace(first, bodies=bodies), dyn.Mechanism(bodies, first.gravity)
@@ -39,8 +35,7 @@ def test_screws_of_other_pitches_are_told_apart() -> None:
     given = states(fresh, 3)
     torques = run(dyn.inverse_dynamics(fresh), given)
     assert np.array_equal(run(dyn.inverse_dynamics(derived), given), torques)
-    recursive = dyn.RecursiveInverseDynamics(derived)
-    assert error(np.array([recursive(*(given[name][0] for name in ("q", "qd", "qdd")))]), torques[:1]) < ROUNDING
+    assert error(dyn.Rows(derived).inverse(*(given[name] for name in ("q", "qd", "qdd"))), torques) < ROUNDING
 
 
 def test_only_a_screw_has_a_pitch_and_none_is_without() -> None:

@@ -12,30 +12,20 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.multibody.bodies.limits import ANYTHING
+from dynamics.multibody.bodies.body import ANYTHING
+from tests.dynamics.io.test_urdf import joint, link, robot
 from tests.each_row import each_row
 from viz import cli
 from viz.models.live_motion import live_of
 
 LEFT_OUT = pytest.mark.filterwarnings("ignore:.*left out:dynamics.MechanismWarning")
 HALF = dyn.Limits((-0.5, 0.5))
-INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
-
-
-def urdf(*joints: tuple[str, str, str]) -> str:
-    """A chain of joints, (name, type, attributes of its limit), about and along y."""
-    links = "".join([f'<link name="{name}">{INERTIAL}</link>' for name, *_ in joints])
-    text = f'<link name="base"/>{links}'
-    for (parent, *_), (name, kind, limit) in zip([("base", "", ""), *joints], joints, strict=False):
-        ends = f'<parent link="{parent}"/><child link="{name}"/><axis xyz="0 1 0"/>'
-        text += f'<joint name="j_{name}" type="{kind}">{ends}{f"<limit {limit}/>" if limit else ""}</joint>'
-    return f'<robot name="r">{text}</robot>'
-
-
-ROBOT = urdf(
-    ("hinge", "revolute", 'lower="-1" upper="2" effort="30" velocity="3.5"'),
-    ("wheel", "continuous", 'effort="5" velocity="7"'),
-    ("slide", "prismatic", 'lower="0" upper="0.2" effort="50" velocity="0.5"'),
+Y = '<axis xyz="0 1 0"/>'
+ROBOT = robot(
+    *[link("base"), *[link(name, 1.0, np.eye(3)) for name in ("hinge", "wheel", "slide")]],
+    joint("j_hinge", "revolute", "base", "hinge", f'{Y}<limit lower="-1" upper="2" effort="30" velocity="3.5"/>'),
+    joint("j_wheel", "continuous", "hinge", "wheel", f'{Y}<limit effort="5" velocity="7"/>'),
+    joint("j_slide", "prismatic", "wheel", "slide", f'{Y}<limit lower="0" upper="0.2" effort="50" velocity="0.5"/>'),
 )
 MODEL = """<mujoco><compiler angle="degree" autolimits="true"/><worldbody>
   <body name="a"><joint name="s" axis="0 1 0" range="-90 45" actuatorfrcrange="-8 9"/><geom size=".1"/>

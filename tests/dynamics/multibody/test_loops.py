@@ -16,15 +16,10 @@ from tests.slow import slow
 from ..linkages import bar, four_bar, squeezer
 from ..mechanisms import random_body, random_joint
 from ..models import run as values
+from .test_ball_and_free import state
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIGHT = 1e-12  # of the largest entry: what a dense solve of the same equations leaves
-
-
-def state_of(model: Any, seed: int = 0) -> dict[str, float]:
-    rng, system = np.random.default_rng(seed), dyn.as_system(model)
-    names = [str(node.name) for node in (*system.q, *system.qd, *system.tau)]
-    return {name: float(rng.normal()) for name in names}
 
 
 def dense_kkt(model: Any, at: dict[str, float], rate: cg.Graph) -> tuple[Array, Array]:
@@ -37,9 +32,9 @@ def dense_kkt(model: Any, at: dict[str, float], rate: cg.Graph) -> tuple[Array, 
     mass, bias = (values(graph, at) for graph in mass_and_bias(model))
     u = np.array([at[f"qd{i}"] for i in range(n)])
     force = np.array([at[f"tau{i}"] for i in range(n)]) - np.array(system.damping) * u - bias
-    basis = [at | {f"qd{i}": float(i == k) for i in range(n)} for k in range(n)]
-    rows = np.array([values(rate, each) for each in basis]).T
-    along = at | {f"q{i}_dot": x for i, x in enumerate(values(q_dot(system), at))}
+    rows = jacobian(rate, at, n)
+    q_dot = system.graph({f"{i}": node for i, node in enumerate(system.q_dot)}, system.q, system.qd)
+    along = at | {f"q{i}_dot": x for i, x in enumerate(values(q_dot, at))}
     change = values(cg.jvp(rate, [f"q{i}" for i in range(system.nq)]), along)
     matrix = np.block([[mass.reshape(n, n), -rows.T], [rows, np.zeros((m, m))]])
     solved = np.linalg.lstsq(matrix, np.concatenate([force, -change]), rcond=1e-13)[0]
@@ -51,8 +46,9 @@ def mass_and_bias(model: dyn.Mechanism) -> tuple[cg.Graph, cg.Graph]:
     return dyn.mass_matrix(model), dyn.bias(model)
 
 
-def q_dot(system: dyn.System) -> cg.Graph:
-    return cg.Graph([*system.q, *system.qd], {f"{i}": node for i, node in enumerate(system.q_dot)})
+def jacobian(rate: cg.Graph, at: dict[str, float], n: int) -> Array:
+    """Rows that are linear in the velocities, by these (m, n)."""
+    return np.array([values(rate, at | {f"qd{i}": float(i == k) for i in range(n)}) for k in range(n)]).T
 
 
 def velocity_rows(model: dyn.Mechanism, loop: dyn.Loop) -> cg.Graph:
@@ -92,7 +88,7 @@ def open_tree(seed: int) -> dyn.Mechanism:
 def closed_tree(kind: str, seed: int = 0) -> tuple[dyn.Mechanism, dyn.Loop, dict[str, float]]:
     """The two chains held together by a loop, and a state where it is closed."""
     tree, rng = open_tree(seed), np.random.default_rng(seed + 100)
-    at = state_of(tree, seed)
+    at = state(tree.system, seed, tau=1)
     motions = [values(tree.motion(name), at) for name in ("b8", "b4")]
     (place, turn), (place_to, turn_to) = ((each[:3], each[9:].reshape(3, 3)) for each in motions)
     offset = 0.2 * rng.normal(size=3)
@@ -116,7 +112,7 @@ def held_still(model: dyn.Mechanism, rate: cg.Graph, at: dict[str, float]) -> di
     """The state with velocities that the rows of velocities allow."""
     n = model.system.n
     u = np.array([at[f"qd{i}"] for i in range(n)])
-    rows = np.array([values(rate, at | {f"qd{i}": float(i == k) for i in range(n)}) for k in range(n)]).T
+    rows = jacobian(rate, at, n)
     return at | {f"qd{i}": x for i, x in enumerate((u - np.linalg.lstsq(rows, rows @ u)[0]).tolist())}
 
 
@@ -168,27 +164,16 @@ def test_andrews_squeezer_has_the_published_accelerations_forces_and_motion() ->
     assert run.q[-1] == pytest.approx([*final, 1.048080741042263, 0.5347301163226948], rel=1e-9)
 
 
-def residuals(model: dyn.Mechanism, run: dyn.Trajectory) -> tuple[float, float]:
-    """The largest phi and the largest rate of a motion."""
-    system = model.system
-    rows = {"phi": system.constraints.positions, "rate": system.constraints.rates}
-    state = {f"q{i}": column for i, column in enumerate(run.q.T)} | {f"qd{i}": x for i, x in enumerate(run.qd.T)}
-    largest = []
-    for nodes in rows.values():
-        graph = cg.Graph([*system.q, *system.qd], {f"{k}": node for k, node in enumerate(nodes)})
-        largest.append(max(float(np.abs(value).max()) for value in graph.evaluate(state).values()))
-    return largest[0], largest[1]
-
-
 @pytest.mark.parametrize(("method", "options"), [("dop853", {"rtol": 1e-9}), ("rk4", {})])
 def test_a_motion_of_50_s_stays_on_its_constraints(method: str, options: dict[str, float]) -> None:
     model = four_bar()
     q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     times = np.linspace(0.0, 50.0, 301)  # between steps, too
     run = dyn.simulate(model, q, qd, 50.0, method, t_eval=times, **options)  # type: ignore[arg-type]
-    position, velocity = residuals(model, run)
-    assert position < 1e-12
-    assert velocity < 1e-13
+    constraints = model.system.constraints
+    for rows, most in ((constraints.positions, 1e-12), (constraints.rates, 1e-13)):
+        graph = model.system.graph({f"row{k}": node for k, node in enumerate(rows)}, model.system.q, model.system.qd)
+        assert np.abs(dyn.arrays_at(model, graph, run.q, run.qd)["row"]).max() < most
     assert np.ptp(run.energy) < (1e-7 if method == "dop853" else 1e-6) * np.abs(run.energy).max()  # forces do no work
 
 
@@ -198,11 +183,9 @@ def test_a_trajectory_has_the_forces_of_its_loops_by_name() -> None:
     q, qd = nearest_state(model, [1.0, -0.8, 1.5], [5.0, 0.0, 0.0])
     servo = dyn.SampledController(lambda q, qd, t: [0.3 - 0.1 * qd[0], 0.0, 0.0], 0.05)
     run = dyn.simulate(model, q, qd, 0.2, tau=servo)
-    state = {f"q{i}": x for i, x in enumerate(run.q.T)} | {f"qd{i}": x for i, x in enumerate(run.qd.T)}
-    expected = dyn.forward_dynamics(model).evaluate(state | {f"tau{i}": x for i, x in enumerate(run.tau.T)})
+    expected = dyn.arrays_at(model, dyn.forward_dynamics(model), run.q, run.qd, tau=run.tau)["lambda"]
     assert list(run.multipliers) == [f"coupler to rocker {axis}" for axis in "xyz"]
-    for k, column in enumerate(run.multipliers.values()):
-        assert column == pytest.approx(np.broadcast_to(expected[f"lambda{k}"], len(run.t)), abs=1e-12)
+    assert np.array([*run.multipliers.values()]) == pytest.approx(expected.T, abs=1e-12)
     assert np.ptp(run.multipliers["coupler to rocker x"]) > 1.0
     assert dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 0.1).multipliers == {}
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dynamics.multibody.bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES, MechanismWarning
-from dynamics.multibody.bodies.many_values import SURELY, unsure
+from dynamics.multibody.trees.structure import SURELY, unsure
 from tests.each_row import each_row
 
 COUNT = 60

@@ -82,19 +82,11 @@ def test_what_is_left_out_and_what_is_kept_is_said_and_can_be_chosen() -> None:
 
 @pytest.mark.parametrize("length", [1e-6, *slow(1.0, 1e6)])
 def test_freedom_is_that_of_the_linkage_in_any_unit(length: float) -> None:
-    sizes = {"crank": 0.3 * length, "coupler": 0.8 * length, "rocker": 0.6 * length}
-    bars = [
-        bar("crank", "world", sizes["crank"], (0, 0, 0)),
-        bar("coupler", "crank", sizes["coupler"], (sizes["crank"], 0, 0)),
-    ]
-    bars.append(bar("rocker", "world", sizes["rocker"], (0.9 * length, 0, 0)))
-    ends = {"at": (sizes["coupler"], 0, 0), "to_at": (sizes["rocker"], 0, 0)}
-    model = dyn.Mechanism(bars, loops=[dyn.Loop("weld", "coupler", "rocker", **ends)])
+    model, hinged = four_bar("weld", length), four_bar("hinge", length)
     held = dyn.freedom(model, [1.0, -0.8, 1.5])
     assert (held.rank, held.freedoms) == (3, 0)  # a weld of coupler and rocker
     open_chain = dyn.freedom(replace(model, loops=()), [1.0, -0.8, 1.5])
     assert (open_chain.rank, open_chain.freedoms, open_chain.redundant) == (0, 3, ())
-    hinged = replace(model, loops=[dyn.Loop("hinge", "coupler", "rocker", axis=(0, 1, 0), to_axis=(0, 1, 0), **ends)])
     found = dyn.freedom(hinged, [1.0, -0.8, 1.5])
     assert (found.rank, found.freedoms, found.tolerance) == (2, 1, 2e-4)
     assert found.redundant == tuple([f"coupler to rocker {row}" for row in ("y", "about x", "about y")])

@@ -68,14 +68,10 @@ def accelerations(graph: Any) -> Any:
     return np.array(list(graph.evaluate(dict(zip(graph.input_names, x.tolist(), strict=True))).values()))
 
 
-def planar() -> dyn.Mechanism:
-    return dyn.planar_arm([0.9] * 3, [0.7] * 3, damping=0.1)
-
-
 @each_row("name", VARIANTS)
 def test_a_variant_computes_the_same_with_other_nodes(name: str) -> None:
     variant = VARIANTS[name]
-    model = planar() if variant.planar else turned_arm(7)
+    model = dyn.planar_arm([0.9] * 3, [0.7] * 3, damping=0.1) if variant.planar else turned_arm(7)
     base, other = dyn.forward_dynamics(model, "recursive"), variant.graph(model)
     assert accelerations(other) == pytest.approx(accelerations(base), rel=ROUNDING)
     assert (len(other.nodes) > len(base.nodes)) is (name not in ("every idea", "dense"))  # dense is smaller at seven

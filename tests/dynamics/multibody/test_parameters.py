@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pytest import approx, mark, param, raises
+from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
@@ -19,14 +19,11 @@ from tests.dynamics.multibody.test_ball_and_free import near
 from tests.dynamics.multibody.test_random_joints import GRAPHS
 from tests.dynamics.parametrized import parametrized
 from tests.each_row import each_row
+from tests.slow import slow
 
 LIGHT = ("inverse dynamics", "forward dynamics", "mass matrix", "bias", "gravity", "momentum", "energy")
 HEAVY = ("chain_rule_literal", "derivatives", "state space", "coriolis", "regressor")
 OF_FRAMES = ("motion", "placement")
-
-
-def slow_cases() -> list[Any]:
-    return [param(base, seed, marks=mark.slow) for base in ("revolute", "ball", "free") for seed in range(4, 40)]
 
 
 def state(mechanism: Mechanism, seed: int = 0) -> dict[str, float]:
@@ -38,9 +35,10 @@ def same(a: Graph, b: Graph) -> bool:
     return not (comparison.only_left or comparison.only_right or comparison.other_outputs)
 
 
-@mark.parametrize(
-    ("base", "seed"), [("revolute", 0), ("free", 2), param("revolute", 1, marks=mark.slow), *slow_cases()]
-)
+SEEDS = [("revolute", 1), *[(base, seed) for base in ("revolute", "ball", "free") for seed in range(4, 40)]]
+
+
+@mark.parametrize(("base", "seed"), [("revolute", 0), ("free", 2), *slow(*SEEDS)])
 def test_every_graph_is_that_of_the_numbers(base: str, seed: int) -> None:
     """Welded bodies among them: masses, centers and parallel axes are then nodes."""
     numbers = random_tree(seed, 3 if seed < 4 else 5, base=base)
@@ -214,7 +212,7 @@ def test_what_takes_numbers_takes_the_values() -> None:
     q, qd, qdd = np.random.default_rng(0).normal(size=(3, 2))
     at = {f"{name}{i}": float(x) for name, row in (("q", q), ("qd", qd), ("qdd", qdd)) for i, x in enumerate(row)}
     tau = values(dyn.inverse_dynamics(arm), at | dict(arm.parameters))
-    assert dyn.RecursiveInverseDynamics(arm)(q, qd, qdd) == approx(tau)
+    assert dyn.Rows(arm).inverse(q, qd, qdd) == approx(tau)
     assert dyn.to_mjcf(arm) == dyn.to_mjcf(arm.bind())
     assert dyn.inertial_parameters(arm) == approx(dyn.inertial_parameters(arm.bind()))
     assert arm.joint_positions(q) == approx(arm.bind().joint_positions(q))

@@ -6,6 +6,7 @@ joint, against Lagrange's equations by differences of the energies, and against 
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
+from unittest.mock import patch
 
 import numpy as np
 from pytest import mark
@@ -18,7 +19,6 @@ from dynamics.multibody.algebra.spatial_vectors import Twist
 from dynamics.multibody.bodies.joint_coordinates import places
 from dynamics.multibody.joints import TYPES, SpatialJoint
 from tests.dynamics.mechanisms import Array, random_body, random_joint, random_state
-from tests.registered import registered
 from tests.slow import slow
 
 ROUNDING = 1e-10  # of the largest of its kind, in some thousand sums; M is not well conditioned in every tree
@@ -116,7 +116,6 @@ class Twins(NamedTuple):
     model: dyn.Mechanism
     twin: dyn.Mechanism
     mixing: Array
-    columns: list[int]  # of a regressor of the second, those of the bodies that both have
 
 
 def twins(seed: int, joint: Random) -> Twins:
@@ -136,7 +135,8 @@ def twins(seed: int, joint: Random) -> Twins:
             bodies.append(body)
             apart.append(body)
             continue
-        placed: dict[str, Any] = {"position": 0.3 * rng.normal(size=3), "orientation": _rotation(rng)}
+        placed: dict[str, Any] = {"position": 0.3 * rng.normal(size=3)}
+        placed["orientation"] = spatial.from_quaternion(rng.normal(size=4))
         body = random_body(name, "random", parent, rng, joint=dyn.Joint("random", armature=armature, **placed))
         bodies.append(body)
         before, outer = np.zeros(3), parent
@@ -156,13 +156,7 @@ def twins(seed: int, joint: Random) -> Twins:
     mixing = np.eye(model.system.n)
     place = {body.name: each.u for body, each in zip(model.moving, places(model.moving), strict=True)}[f"b{at}"]
     mixing[place, place] = joint.mixing
-    both = {body.name for body in model.moving}
-    columns = [10 * i + k for i, body in enumerate(twin.moving) if body.name in both for k in range(10)]
-    return Twins(model, twin, mixing, columns)
-
-
-def _rotation(rng: np.random.Generator) -> Array:
-    return spatial.from_quaternion(rng.normal(size=4))
+    return Twins(model, twin, mixing)
 
 
 def _state(given: Twins, seed: int) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -183,103 +177,68 @@ def _values(graph: cg.Graph, state: dict[str, Array]) -> Array:
     return np.array(list(values.values()), dtype=np.float64)
 
 
-Rows = Callable[[Array, Twins], Array]  # values of the second as those of the first
+def _as_first(values: Array, given: Twins, kinds: str) -> Array:
+    """Values of the second as those of the first, block by block.
+
+    kinds: of rows, and behind | of columns: q coordinates, v velocities, f forces, 1 what both have alike.
+    """
+    system, found = given.model.system, []
+    of = {"q": np.eye(system.nq), "v": np.linalg.inv(given.mixing), "f": given.mixing.T}
+
+    def side(kinds: str) -> Array:
+        parts = [of[kind].copy() for kind in kinds]
+        return np.block([[part if part is row else np.zeros((len(row), len(part))) for part in parts] for row in parts])
+
+    for block in kinds.split():
+        rows, _, columns = block.partition("|")
+        of["1"] = np.eye(len(values) // (system.n if columns else 1))
+        left, right = side(rows), np.linalg.inv(side(columns)) if columns else np.eye(1)
+        table, values = np.split(values, [len(left) * len(right)])
+        found.append((left @ table.reshape(len(left), -1) @ right).ravel())
+    return np.concatenate(found)
 
 
-def _alike(values: Array, given: Twins) -> Array:
-    return values
-
-
-def _forces(values: Array, given: Twins) -> Array:
-    return given.mixing.T @ values
-
-
-def _matrix(values: Array, given: Twins) -> Array:
-    n = given.model.system.n
-    squares = values.reshape(-1, n, n)
-    return (given.mixing.T @ squares @ given.mixing).ravel()
-
-
-def _torques_and_matrices(values: Array, given: Twins) -> Array:
-    n = given.model.system.n
-    return np.concatenate([_forces(values[:n], given), _matrix(values[n:], given)])
-
-
-def _accelerations(values: Array, given: Twins) -> Array:
-    return np.linalg.solve(given.mixing, values)
-
-
-def _state_rate(values: Array, given: Twins) -> Array:
-    nq = given.model.system.nq
-    return np.concatenate([values[:nq], _accelerations(values[nq:], given)])
-
-
-def _momentum_rate(values: Array, given: Twins) -> Array:
-    nq = given.model.system.nq
-    return np.concatenate([values[:nq], _forces(values[nq:], given)])
-
-
-def _inverse(values: Array, given: Twins) -> Array:
-    n, back = given.model.system.n, np.linalg.inv(given.mixing)
-    return (back @ values.reshape(n, n) @ back.T).ravel()
-
-
-def _columns(values: Array, given: Twins) -> Array:
-    return (values.reshape(-1, given.model.system.n) @ given.mixing).ravel()
-
-
-def _regressor(values: Array, given: Twins) -> Array:
-    return (given.mixing.T @ values.reshape(given.model.system.n, -1)[:, given.columns]).ravel()
-
-
-def _state_space(values: Array, given: Twins) -> Array:
-    n, inverse = given.model.system.n, np.linalg.inv(given.mixing)
-    both, back = np.kron(np.eye(2), given.mixing), np.kron(np.eye(2), inverse)
-    a, b = values[: 4 * n * n].reshape(2 * n, 2 * n), values[4 * n * n :].reshape(2 * n, n)
-    return np.concatenate([(back @ a @ both).ravel(), (back @ b @ inverse.T).ravel()])
-
-
-def _state_space_of_momenta(values: Array, given: Twins) -> Array:
-    n, g, back = given.model.system.n, given.mixing, np.linalg.inv(given.mixing)
-    out, into = np.block([[back, 0 * g], [0 * g, g.T]]), np.block([[g, 0 * g], [0 * g, back.T]])
-    a, b = values[: 4 * n * n].reshape(2 * n, 2 * n), values[4 * n * n :].reshape(2 * n, n)
-    return np.concatenate([(out @ a @ into).ravel(), (out @ b @ back.T).ravel()])
+def _regressor(model: dyn.Mechanism) -> cg.Graph:
+    """Columns of the bodies that both have."""
+    graph, bodies = dyn.regressor(model), [body.name for body in model.moving]
+    own = {name: node for name, node in graph.outputs.items() if "." not in bodies[int(name.split("_")[2]) // 10]}
+    return cg.Graph(graph.inputs, own)
 
 
 LAST: Callable[[dyn.Mechanism], str] = lambda model: model.bodies[-1].name  # noqa: E731 (a name for a short function)
 AT = (0.3, -0.2, 0.1)
-GRAPHS: dict[str, tuple[Callable[[dyn.Mechanism], cg.Graph], Rows]] = {
-    "inverse dynamics": (dyn.inverse_dynamics, _forces),
-    **{name: (lambda m, name=name: dyn.inverse_dynamics(m, name), _forces) for name in dyn.FORMULATIONS},
-    "forward dynamics": (dyn.forward_dynamics, _accelerations),
-    "state equation": (dyn.state_equation, _state_rate),
-    "mass matrix": (dyn.mass_matrix, _matrix),
-    "inverse mass matrix": (dyn.inverse_mass_matrix, _inverse),
-    "bias": (dyn.bias, _forces),
-    "gravity": (dyn.gravity_force, _forces),
-    "coriolis": (dyn.coriolis, _matrix),
-    "momentum": (dyn.momentum, _forces),
-    "momentum rate": (dyn.momentum_rate, _forces),
-    "energy": (dyn.energy, _alike),
-    "kinetic": (dyn.kinetic_energy, _alike),
-    "potential": (dyn.potential_energy, _alike),
-    "derivatives": (dyn.inverse_dynamics_derivatives, _torques_and_matrices),
-    "state space": (dyn.state_space, _state_space),
-    "state space of momenta": (lambda m: dyn.state_space(m, form="momentum"), _state_space_of_momenta),
-    "hamiltonian": (dyn.hamiltonian, _alike),
-    "hamilton equations": (dyn.hamilton_equations, _momentum_rate),
-    "regressor": (dyn.regressor, _regressor),
-    "center of mass": (dyn.center_of_mass, _alike),
-    "its Jacobian": (dyn.center_of_mass_jacobian, _columns),
-    "spatial momentum": (dyn.spatial_momentum, _alike),
-    "momentum about the center": (lambda m: dyn.spatial_momentum(m, "center of mass"), _alike),
-    "placement": (lambda m: dyn.frame_placement(m, LAST(m), AT), _alike),
-    "velocity": (lambda m: dyn.frame_velocity(m, LAST(m), AT, "body"), _alike),
-    "acceleration": (lambda m: dyn.frame_acceleration(m, LAST(m), AT), _alike),
-    "bias acceleration": (lambda m: dyn.frame_bias_acceleration(m, LAST(m), AT), _alike),
-    "jacobian": (lambda m: dyn.frame_jacobian(m, LAST(m), AT), _columns),
-    "jacobian rate": (lambda m: dyn.frame_jacobian_rate(m, LAST(m), AT), _columns),
-    "motion": (lambda m: m.motion(LAST(m), AT), _alike),
+GRAPHS: dict[str, tuple[Callable[[dyn.Mechanism], cg.Graph], str]] = {
+    "inverse dynamics": (dyn.inverse_dynamics, "f"),
+    **{name: (lambda m, name=name: dyn.inverse_dynamics(m, name), "f") for name in dyn.FORMULATIONS},
+    "forward dynamics": (dyn.forward_dynamics, "v"),
+    "state equation": (dyn.state_equation, "q v"),
+    "mass matrix": (dyn.mass_matrix, "f|v"),
+    "inverse mass matrix": (dyn.inverse_mass_matrix, "v|f"),
+    "bias": (dyn.bias, "f"),
+    "gravity": (dyn.gravity_force, "f"),
+    "coriolis": (dyn.coriolis, "f|v"),
+    "momentum": (dyn.momentum, "f"),
+    "momentum rate": (dyn.momentum_rate, "f"),
+    "energy": (dyn.energy, "1"),
+    "kinetic": (dyn.kinetic_energy, "1"),
+    "potential": (dyn.potential_energy, "1"),
+    "derivatives": (dyn.inverse_dynamics_derivatives, "f f|v f|v f|v"),
+    "state space": (dyn.state_space, "vv|vv vv|f"),
+    "state space of momenta": (lambda m: dyn.state_space(m, form="momentum"), "vf|vf vf|f"),
+    "hamiltonian": (dyn.hamiltonian, "1"),
+    "hamilton equations": (dyn.hamilton_equations, "q f"),
+    "regressor": (_regressor, "f|1"),
+    "center of mass": (dyn.center_of_mass, "1"),
+    "its Jacobian": (dyn.center_of_mass_jacobian, "1|v"),
+    "spatial momentum": (dyn.spatial_momentum, "1"),
+    "momentum about the center": (lambda m: dyn.spatial_momentum(m, "center of mass"), "1"),
+    "placement": (lambda m: dyn.frame_placement(m, LAST(m), AT), "1"),
+    "velocity": (lambda m: dyn.frame_velocity(m, LAST(m), AT, "body"), "1"),
+    "acceleration": (lambda m: dyn.frame_acceleration(m, LAST(m), AT), "1"),
+    "bias acceleration": (lambda m: dyn.frame_bias_acceleration(m, LAST(m), AT), "1"),
+    "jacobian": (lambda m: dyn.frame_jacobian(m, LAST(m), AT), "1|v"),
+    "jacobian rate": (lambda m: dyn.frame_jacobian_rate(m, LAST(m), AT), "1|v"),
+    "motion": (lambda m: m.motion(LAST(m), AT), "1"),
 }
 EMBEDDED = ("by_definition", "kinetic_only", "kinetic_only_exact")  # in the velocities of the coordinates alone
 
@@ -296,20 +255,20 @@ SEEDS = [*FEW, *slow(*[seed for seed in range(100) if seed not in FEW])]
 @mark.parametrize("seed", SEEDS)
 def test_every_graph_is_that_of_its_joints_of_one_axis(seed: int) -> None:
     joint = Random(seed, mixed=seed % 2 == 1)
-    with registered(TYPES, random=joint):
+    with patch.dict(TYPES, random=joint):
         compare(twins(seed, joint), seed)
 
 
 def compare(given: Twins, seed: int) -> None:
     first, second = _state(given, seed + 7)
     worst: dict[str, float] = {}
-    for name, (derive, as_first) in GRAPHS.items():
+    for name, (derive, kinds) in GRAPHS.items():
         if name in EMBEDDED and given.model.system.kinematics.quasi is not None:
             continue
         value = _values(derive(given.model), first)
-        worst[name] = _error(value, as_first(_values(derive(given.twin), second), given))
-    recursive = [dyn.RecursiveInverseDynamics(model) for model in given[:2]]
-    torques = [run(*[s[k] for k in ("q", "qd", "qdd")]) for run, s in zip(recursive, (first, second), strict=True)]
-    worst["body by body"] = _error(torques[0], _forces(torques[1], given))
+        worst[name] = _error(value, _as_first(_values(derive(given.twin), second), given, kinds))
+    both = zip(given[:2], (first, second), strict=True)
+    torques = [dyn.Rows(model).inverse(*[s[k] for k in ("q", "qd", "qdd")]) for model, s in both]
+    worst["by rows"] = _error(torques[0], _as_first(torques[1], given, "f"))
     wrong = {name: e for name, e in worst.items() if not e < (THROUGH_STEP if name in EMBEDDED else ROUNDING)}
     assert not wrong

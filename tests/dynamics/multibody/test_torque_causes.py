@@ -9,7 +9,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics import torque_by_cause
-from dynamics.multibody.changes.switched_effects import without_effect
+from dynamics.multibody.changes.pruning import without_effect
 from tests.dynamics.mechanisms import EVERY_KIND, random_state, random_tree
 from tests.each_row import each_row
 from tests.tolerances import EQUATIONS, LONG_SUM, TORQUES

@@ -29,7 +29,14 @@ from tests.slow import slow
 
 # Of the sums of sizes that an answer comes from: what some ten to thirty roundings leave.
 OF_SIZES = {"mass": 2e-15, "bias": 4e-15, "torques": 4e-15, "by velocities": 4e-15, "chain rule": 1e-14}
-OF_SIZES |= {"body by body": 1e-14, "regrouped": 1e-13, "recursive": 3e-15, "dense": 6e-15, "auto": 6e-15}
+OF_SIZES |= {
+    "by rows": 4e-15,
+    "forward by rows": 4e-15,
+    "regrouped": 1e-13,
+    "recursive": 3e-15,
+    "dense": 6e-15,
+    "auto": 6e-15,
+}
 MASS, RECURSIVE, DENSE = 2e-15, 4e-15, 1e-14  # of the largest entry, which may be what is left of larger ones
 CANCELLED = 3e-14  # of the largest entry, over hundreds of trees
 
@@ -58,7 +65,8 @@ def errors(tree: dyn.Mechanism, seed: int, *of_all: str) -> tuple[dict[str, floa
         "recursive": (lambda: values(dyn.forward_dynamics(tree, "recursive"), at), "accelerations"),
         "dense": (lambda: values(dyn.forward_dynamics(tree, "dense"), at), "accelerations"),
         "auto": (lambda: values(dyn.forward_dynamics(tree), at), "accelerations"),
-        "body by body": (lambda: dyn.RecursiveInverseDynamics(tree)(q, qd, qdd), "torques"),
+        "by rows": (lambda: dyn.Rows(tree).inverse(q, qd, qdd), "torques"),
+        "forward by rows": (lambda: dyn.Rows(tree).forward(q, qd, tau), "accelerations"),
         "regrouped": (lambda: values(dyn.inverse_dynamics(replace(tree, base_parameters=True)), at), "torques"),
     }
     found = {name: (row(), of) for name, (row, of) in rows.items() if not of_all or name in of_all}

@@ -13,13 +13,13 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.experiments.work_precision.measurement import problem_of
 from dynamics.experiments.work_precision.named_tasks import load
-from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.multiprecision import Reference, ReferenceFailedError, reference
 from dynamics.systems.ode_system import OdeSystem
 from tests.bench.motions.trajectory_peers import heyoka_equations
+from tests.dynamics.models import split_state
 from tests.dynamics.simulation.test_quasi_velocities import drone
-from tests.dynamics.split_state import split_state
 from tests.each_row import each_row
 from tests.oracles import closed_forms
 
@@ -28,7 +28,6 @@ BOTH_14, BOTH_20 = 1e-14, 1e-19  # two solutions, of which one has 14 or 20 digi
 EXACT = 1e-15  # arcs of parabolas in float64
 THIRTY = 1e-29  # two solutions of thirty digits, of which one is off by its stated error
 LAST_BITS = 1e-10  # relative, of a difference that float64 holds to ten digits
-SAME_TEXT = 1e-16  # relative: the float64 next to both is one
 
 TIMES = [0.25, 1.0, 9.0]
 PENDULUM = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 9.81 * cg.cos(q[0]), ["angle"])

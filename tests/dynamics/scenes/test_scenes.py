@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest import mark, raises
+from pytest import approx, mark, raises
 
 import dynamics as dyn
 from dynamics import MechanismError, scenes
+from dynamics.multibody.builders import planar_links
 from tests.each_row import each_row
+from tests.tolerances import LAST_BITS
 
 INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" diaginertia="0.3 0.4 0.5"/>'
 MJCF = f"""<?xml version="1.0"?><!-- a hinge and a slide --><mujoco><worldbody>
@@ -46,9 +48,20 @@ def test_a_scene_is_called_by_its_name_and_starts_in_a_state_of_its_model(name: 
     assert np.isfinite(dyn.simulate(scene, scene.q, scene.qd, 0.01).q).all()
 
 
-def test_options_go_to_the_scene_s_function() -> None:
-    assert scenes.load("chain", n=4).system.n == 4
-    assert not np.any(scenes.load("triple_pendulum", mass_model="point").model.bodies[0].inertia)
+def test_the_triple_pendulum_is_the_paper_s() -> None:
+    scene = scenes.load("triple_pendulum")
+    assert [(link.mass, link.length) for link in planar_links(scene.model)] == [(1.0, 1.0), (0.8, 0.8), (0.7, 0.7)]
+    assert (scene.system.damping, scene.model.gravity) == ((0.1, 0.1, 0.1), (0.0, 0.0, -9.81))
+    assert (scene.q, scene.qd) == ((np.pi / 2, 0.0, 0.0), (0.0, 0.0, 0.0))
+    points = planar_links(scenes.load("triple_pendulum", mass_model="point").model)
+    assert {link.inertia for link in points} == {0.0}
+
+
+@mark.parametrize("n", [1, 4, 10])
+def test_a_chain_weighs_a_kilogram_and_is_a_metre_long_however_many_links(n: int) -> None:
+    links = planar_links(scenes.load("chain", n=n).model)
+    assert len(links) == n
+    assert (sum(x.mass for x in links), sum(x.length for x in links)) == approx((1.0, 1.0), rel=LAST_BITS)
 
 
 READ = "ignore, floating, limits, friction, actuators, contacts"

@@ -12,10 +12,9 @@ import dynamics as dyn
 from dynamics import METHODS
 from dynamics.integrators import derive
 from tests.dynamics.models import Array
-from tests.dynamics.step_options import EVERY_METHOD, step
+from tests.dynamics.step_options import ADAPTIVE, EVERY_METHOD, step
 
 RUN_ERROR = 1e-8  # of runs at rtol 1e-9 and less, or of fourth order at 2 ms
-ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 START: dict[str, Any] = {"q": [0.4, -0.2], "qd": [0.0, 0.1]}
 GAINS = {"kp": 20.0, "kd": 3.0}
 

@@ -12,14 +12,12 @@ from pytest import approx, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics import METHODS
 from dynamics.simulation.error_estimate import runs_beside
 from dynamics.simulation.steps.equal_steps import equal_steps, sampled_numbers
 from tests.dynamics.models import random_arm
-from tests.dynamics.step_options import LIKE_OTHERS
+from tests.dynamics.step_options import EQUAL, LIKE_OTHERS
 from tests.slow import slow
 
-EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
 LOOSE = 1e6  # a bound that no estimate of these runs exceeds
 FACTOR = 2.0  # of an error, by which an estimate may miss it
 ROUNDING = 1e-14  # below it an error is no power of the step

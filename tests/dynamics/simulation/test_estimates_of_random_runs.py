@@ -9,12 +9,11 @@ from pytest import importorskip, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics import METHODS
 from tests.dynamics.models import Array
+from tests.dynamics.step_options import EQUAL
 from tests.slow import slow
 
 solve_ivp = importorskip("scipy.integrate").solve_ivp
-EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
 KINDS = ["kink", "rows"]
 UNDER, OVER = 10.0, 1e3  # by which an estimate may be too small unless it is said, and too large
 RTOL, EXACT = 1e-13, 1e-12  # of the steps of SciPy, and of its motions; smaller errors are not compared

@@ -12,12 +12,11 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph.util.caches import kept_results
-from dynamics import METHODS
+from tests.dynamics.step_options import EQUAL
 from tests.each_row import each_row
 from tests.slow import slow
 
 RIGHT = 1e-2  # relative: a slope that needs no word
-EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
 USUAL = "euler rk4 verlet midpoint gauss4".split()
 
 

@@ -15,8 +15,7 @@ from dynamics import simulate_many
 from dynamics.simulation.ensembles import task
 from dynamics.simulation.ensembles.task import FEW_TRAJECTORIES, VECTOR, fits_lanes
 from dynamics.simulation.steps.step_program import StepProgram
-from tests.dynamics.ensembles import same
-from tests.dynamics.models import oscillator, random_arm
+from tests.dynamics.models import oscillator, random_arm, same
 from tests.early_end import stops
 from tests.slow import slow
 

@@ -14,10 +14,10 @@ import dynamics as dyn
 from dynamics import METHODS
 from tests.dynamics.models import oscillator
 from tests.dynamics.simulation.test_simulate import ARGUMENTS
+from tests.dynamics.step_options import ADAPTIVE
 from tests.each_row import each_row
 from tests.slow import slow
 
-ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 EQUAL = ["rk4", "euler", "gauss4", "verlet"]
 ARM = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
 START = [1.0, 0.5], [0.2, -0.1]

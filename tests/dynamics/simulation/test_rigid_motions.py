@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 from pytest import mark
 
 import dynamics as dyn
@@ -25,33 +24,6 @@ def rotor() -> dyn.Mechanism:
 def rotations(quaternions: Array) -> Array:
     """(T, 3, 3)."""
     return np.array([from_quaternion(q) for q in quaternions])
-
-
-def inertia(rng: np.random.Generator) -> Array:
-    """Of six point masses."""
-    places = rng.normal(size=(6, 3))
-    return 0.05 * sum([(p @ p) * np.eye(3) - np.outer(p, p) for p in places])
-
-
-def trunk(rng: np.random.Generator, joint: dyn.Joint, parent: str = "world") -> dyn.Body:
-    """The base of a tree, on any joint."""
-    return dyn.Body("base", joint, parent, mass=2.0, center=[0.1, -0.1, 0.2], inertia=inertia(rng))
-
-
-def branches(rng: np.random.Generator) -> list[dyn.Body]:
-    """What the base carries: a leg on a ball joint, with a hinged foot."""
-    leg = dyn.Joint("ball", position=[0.3, 0.1, 0.0])
-    foot = dyn.Joint("revolute", axis=[0.0, 1.0, 1.0], position=[0.4, 0.0, 0.0])
-    return [
-        dyn.Body("leg", leg, "base", mass=1.0, center=[0.2, 0.0, 0.1], inertia=inertia(rng)),
-        dyn.Body("foot", foot, "leg", mass=0.5, center=[0.1, 0.2, 0.0], inertia=inertia(rng)),
-    ]
-
-
-def tree(kind: str = "free", gravity: ArrayLike = (0.0, 0.0, 0.0)) -> dyn.Mechanism:
-    """A tree on a free base."""
-    rng = np.random.default_rng(3)
-    return dyn.Mechanism([trunk(rng, dyn.Joint(kind)), *branches(rng)], gravity=gravity)
 
 
 @mark.optimized  # the bound is that of fused products

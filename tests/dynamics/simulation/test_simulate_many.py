@@ -15,8 +15,7 @@ import dynamics as dyn
 from dynamics import METHODS, System, as_system, simulate_many
 from dynamics.simulation.ensembles import task
 from dynamics.simulation.steps.equal_steps import even_steps
-from tests.dynamics.ensembles import arms, same
-from tests.dynamics.models import oscillator, random_arm
+from tests.dynamics.models import arms, oscillator, random_arm, same
 from tests.dynamics.simulation.test_lanes import COUNT, LANES
 from tests.dynamics.simulation.test_simulate import runaway
 from tests.dynamics.step_options import LIKE_OTHERS, step

@@ -8,10 +8,9 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics import METHODS
+from tests.dynamics.step_options import ADAPTIVE
 from tests.slow import slow
 
-ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 UNITS = [(1.0, 1.0), *slow(((2.0**20, 2.0**-20),), ((2.0**-20, 2.0**20),))]  # of length and time
 SMOOTH, JUMPS = 1e-8, 1e-6  # relative: ten times rtol, and a thousand times where the force jumps
 Push = Any

@@ -6,12 +6,11 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics import METHODS
 from tests.dynamics.mechanisms import random_body, random_joint, random_rotation
+from tests.dynamics.step_options import ADAPTIVE
 from tests.dynamics.units import Units, in_units
 from tests.slow import slow
 
-ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 AS_WELL = 1e-6  # relative: what another unit may change, runs at rtol 1e-9
 
 

@@ -20,8 +20,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.simulation.ensembles import task
 from dynamics.simulation.ensembles.store import Store
-from tests.dynamics.ensembles import arms, same
-from tests.dynamics.models import oscillator
+from tests.dynamics.models import arms, oscillator, same
 
 ROWS = [0.1, 0.2]
 UP = dyn.Event("up", lambda q, qd, t: q[0], direction=1)

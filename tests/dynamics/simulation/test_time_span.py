@@ -8,12 +8,10 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics import METHODS
 from tests.dynamics.models import oscillator
-from tests.dynamics.step_options import EVERY_METHOD, LIKE_OTHERS, step
+from tests.dynamics.step_options import EQUAL, EVERY_METHOD, LIKE_OTHERS, step
 from tests.slow import slow
 
-EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
 ROUNDING = 1e-13  # of some tens of steps of order 1
 BACK = 1e-5  # there and back by a symmetric method, or by steps within 1e-9
 

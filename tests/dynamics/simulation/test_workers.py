@@ -19,8 +19,7 @@ from cgraph.codegen import llvm_engine
 from dynamics import simulate_many
 from dynamics.simulation.ensembles import task
 from dynamics.simulation.steps import step_program
-from tests.dynamics.ensembles import arms, same
-from tests.dynamics.models import random_arm
+from tests.dynamics.models import arms, random_arm, same
 from tests.dynamics.step_options import step
 from tests.early_end import stops
 from tests.slow import slow

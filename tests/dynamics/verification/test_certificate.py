@@ -28,6 +28,7 @@ from dynamics.verification.certificate import certify
 from dynamics.verification.held_states import Held, new_rows, random_states
 from dynamics.verification.residual import ROUNDING, Certificate, Residual
 from tests.dynamics.equations.test_constraints import moving_wall, pulleys, sleigh
+from tests.dynamics.io.test_urdf import joint, link, robot
 from tests.dynamics.linkages import bar, four_bar, peaucellier
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS
@@ -295,14 +296,11 @@ def test_what_cannot_be_certified_is_an_error(model: dyn.Model, given: dict[str,
 
 def urdf(parents: list[int]) -> str:
     """Links on hinges, each on another, -1 for the world."""
-    link = (
-        '<link name="b{0}"><inertial><origin xyz="0 0.1 -0.5"/><mass value="1"/>'
-        '<inertia ixx="0.2" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.1"/></inertial></link>'
-        '<joint name="j{0}" type="continuous"><parent link="{1}"/><child link="b{0}"/><origin xyz="0.1 0 -1"/>'
-        '<axis xyz="0 1 0.2"/></joint>'
-    )
-    links = [link.format(k, f"b{parent}" if parent >= 0 else "world") for k, parent in enumerate(parents)]
-    return f'<robot name="r"><link name="world"/>{"".join(links)}</robot>'
+    names, inside = [f"b{k}" for k in range(len(parents))], '<origin xyz="0.1 0 -1"/><axis xyz="0 1 0.2"/>'
+    links = [link(name, 1.0, np.diag([0.2, 0.2, 0.1]), '<origin xyz="0 0.1 -0.5"/>') for name in names]
+    carriers = [names[on] if on >= 0 else "world" for on in parents]
+    joints = [joint(f"j{name}", "continuous", on, name, inside) for name, on in zip(names, carriers, strict=True)]
+    return robot(link("world"), *links, *joints)
 
 
 def test_a_urdf_file_is_a_twin_whatever_the_order_of_its_joints(tmp_path) -> None:

@@ -1,6 +1,5 @@
 """The commands that explain: lint, why and compare, as a person starts them."""
 
-import cmath
 import json
 import re
 from pathlib import Path
@@ -8,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.formulations.step_state import after_step
+from dynamics.equations.formulations.lagrange_terms import after_step
+from tests import high_precision
 from tests.each_row import each_row
 from viz import cli, theme
 from viz.commands.points import filled
@@ -21,18 +20,6 @@ MODEL = """<mujoco><compiler angle="radian"/><worldbody>
 <body name="b"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.5" contype="0"/></body></body>
 </worldbody></mujoco>"""
 ROUNDING = 1e-12  # relative, for sums of a few thousand products
-
-
-def by_complex_step(graph: cg.Graph, output: str, name: str, at: dict[str, float]) -> float:
-    """A derivative from values alone: the imaginary part at a step of 1e-200 i, which cancels nothing."""
-    values: dict[cg.Node, complex] = {}
-    for node in graph.nodes:
-        if node.args:
-            function = node.op.operator or getattr(cmath, node.op.name)
-            values[node] = function(*[values[arg] for arg in node.args])
-        else:
-            values[node] = at[node.name] + (1e-200j if node.name == name else 0) if node.name else node.value
-    return values[graph.outputs[output]].imag / 1e-200
 
 
 @each_row("formulation", EMBEDDED)
@@ -149,7 +136,7 @@ def test_why_adds_up_to_the_derivative(said, figures):
     found = figures("why", "triple_pendulum", "tau0", "q2", "--k", "1000")
     assert found["paths"] == len(found["listed"]) == 22
     graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "chain_rule")
-    exact = by_complex_step(graph, "tau0", "q2", found["at"])
+    exact = float(high_precision.directional(graph, found["at"], {"q2": 1.0})["tau0"])
     assert abs(sum(path["value"] for path in found["listed"]) - exact) <= ROUNDING
     assert found["difference"] <= ROUNDING
     text = said("why", "triple_pendulum", "tau0", "q2", "--k", "1000")

@@ -12,17 +12,13 @@ ROUNDING = 1e-12  # relative, for sums of a few hundred products
 SCENES = ("spring_mass", "own.py:planet", "own.py:flying")
 
 
-def sizes(graph):
-    counts = graph.counts()
-    return {"nodes": counts.nodes, "edges": counts.edges, "depth": counts.depth, "width": counts.width}
-
-
 @each_row("scene", SCENES)
 def test_lint_and_compare_have_the_sizes_of_both_forms(own, figures, scene):
     model = dyn.scenes.load(scene)
     forms = dyn.state_equation(model), dyn.hamilton_equations(model)
     linted = figures("lint", scene, "--momentum")
-    assert [*linted["sizes"].values()][:2] == [sizes(graph) for graph in forms]
+    sizes = [{key: getattr(graph.counts(), key) for key in ("nodes", "edges", "depth", "width")} for graph in forms]
+    assert [*linted["sizes"].values()][:2] == sizes
     found = figures("compare", scene, "--momentum", status=1)
     assert found["sizes"] == linted["sizes"]
     assert found["sizes"]["velocities alone"]["depth"] <= found["sizes"]["Hamilton's equations"]["depth"]

@@ -18,11 +18,6 @@ GRAPHS = {
 }
 
 
-def rectangles(svg: str) -> list[tuple[float, float]]:
-    """Left and top of the nodes."""
-    return [(float(x), float(y)) for x, y in re.findall(r'<rect x="([-0-9.]+)" y="([-0-9.]+)"', svg)]
-
-
 @each_row("name", GRAPHS)
 def test_the_longest_way_has_an_operation_at_every_depth(name: str) -> None:
     graph = GRAPHS[name]
@@ -33,7 +28,8 @@ def test_the_longest_way_has_an_operation_at_every_depth(name: str) -> None:
 
 
 def test_rows_are_depths_alike_in_all_panels_and_no_two_nodes_touch() -> None:
-    places = rectangles(levels_svg(GRAPHS, SCALE))
+    found = re.findall(r'<rect x="([-0-9.]+)" y="([-0-9.]+)"', levels_svg(GRAPHS, SCALE))
+    places = [(float(x), float(y)) for x, y in found]
     assert len(places) == sum(len(graph.nodes) for graph in GRAPHS.values())
     deepest = max(graph.counts().depth for graph in GRAPHS.values())
     expected = [SCALE.y(level, deepest) - 4.0 for graph in GRAPHS.values() for level in levels_of(graph).values()]

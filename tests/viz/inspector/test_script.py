@@ -15,10 +15,10 @@ from cgraph.extend import Names
 from cgraph.operations.table import OPS
 from tests.page_script import run_script
 from tests.tolerances import SUMS
-from viz.animation.surfaces import surfaces
+from viz.animation.panels import surfaces
 from viz.inspector.content import State, StateTable, Version
 from viz.inspector.record import record
-from viz.models.inspection import PAPER, Inspection, inspection
+from viz.models.inspection import PAPER, inspection
 from viz.pages.operations import graph_data, slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
@@ -193,7 +193,7 @@ def test_a_node_has_one_number_everywhere(pendulum):
     for version, found in zip(pendulum[1:], numbers[1:], strict=True):
         graph = version.graph
         lines, tooltips = graph.listing().splitlines(), viz.to_dot(graph).source
-        names, c, python = Names(graph), cg.to_c(graph).source, source(graph, lambda op: op.python, ())
+        names, c, python = Names(graph), cg.to_c(graph).source, source(graph, lambda op: op.python)
         for node, number in zip(graph.nodes, found, strict=True):
             assert bool(number) == bool(node.args)
             if number:
@@ -205,13 +205,10 @@ def test_a_node_has_one_number_everywhere(pendulum):
 
 
 @cache
-def found_in_spring() -> Inspection:
-    return inspection(dyn.scenes.load("spring_mass"))
-
-
-def spring(at: dict[str, float]) -> tuple[list[Version], State]:
-    found = found_in_spring()
-    return list(found.versions.values()), State(dict(found.at) | at | {"tau0": 0.3}, found.derived)
+def spring() -> tuple[list[Version], State]:
+    found = inspection(dyn.scenes.load("spring_mass"))
+    at = dict(found.at) | {"q0": 0.3, "qd0": 0.2, "qdd0": 0.1, "tau0": 0.3}
+    return list(found.versions.values()), State(at, found.derived)
 
 
 @pytest.mark.parametrize(
@@ -219,7 +216,7 @@ def spring(at: dict[str, float]) -> tuple[list[Version], State]:
     [({"q0_old": 1.0}, "follows from q0, qd0"), ({"nobody": 1.0}, "no input nobody"), ({"q0": "x"}, "finite number")],
 )
 def test_a_change_that_means_nothing_is_one_sentence_and_changes_nothing(change, said):
-    versions, state = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})
+    versions, state = spring()
     program = """(record, change) => {
       const state = makeState(record), before = JSON.stringify(state.values());
       try { state.set({ dt: 0.5, ...change }); }
@@ -233,7 +230,7 @@ def test_a_change_that_means_nothing_is_one_sentence_and_changes_nothing(change,
 
 
 def test_a_state_and_its_tables_are_checked():
-    versions, state = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1})
+    versions, state = spring()
     for changed, said in (
         (State({"q0_old": 1.0}, state.derived), "q0_old"),
         (State({}, cg.Graph(cg.variables("q0"), {"nobody": cg.variable("q0")})), "nobody"),

@@ -4,6 +4,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -17,7 +18,6 @@ from cgraph.extend import OPS, Op
 from dynamics.integrators import TABLEAUS
 from dynamics.scenes.scenes import of_model
 from tests.each_row import each_row
-from tests.registered import registered
 from tests.viz.page_elements import data_of
 from viz.lessons.screens.energy_and_step import energy_and_step
 from viz.lessons.subject import subject_of
@@ -322,7 +322,7 @@ def test_an_operation_of_ones_own_works_in_pages_and_one_without_javascript_is_t
     def spring(op):
         return dyn.System(lambda q, qd, t: qd[0] ** 2 - apply(op, q[0]), ["x"])
 
-    with registered(OPS, bowl=bowl):
+    with patch.dict(OPS, bowl=bowl):
         script = Script(live_of(of_model(spring(bowl))))
         script.engine.eval("run.set(0, 0.3)")
         potential = [each["called"] for each in script("data.meters")].index("potential")
@@ -330,7 +330,7 @@ def test_an_operation_of_ones_own_works_in_pages_and_one_without_javascript_is_t
         script.engine.close()
         assert bowl.javascript in energy_and_step(subject_of(spring(bowl))).play["modules"]
     bare = replace(bowl, javascript="")
-    with registered(OPS, bowl=bare):
+    with patch.dict(OPS, bowl=bare):
         for made in (viz.live, lambda system: energy_and_step(subject_of(system))):
             with pytest.raises(ValueError, match=r"'bowl' has no text in JavaScript, .* the column `javascript`"):
                 made(spring(bare))

@@ -40,24 +40,16 @@ def test_a_pivot_is_the_inertia_that_is_left_when_all_joints_further_out_follow(
         gone.append(i)
     for step in steps[n:]:
         assert step.value is graph.outputs[f"qdd{step.joint}"]
-    lit = [node for step in steps for node in step.nodes]
-    assert len(set(lit)) == len(lit)  # a node is new once
-    assert {node for node in graph.nodes if node.args} == set(lit)
-
-
-@each_row("name", MODELS)
-def test_the_velocities_of_momenta_have_the_same_pivots_and_the_rates_come_after_them(name):
-    model = MODELS[name]
-    names, graphs = dyn.display_names(model), (dyn.forward_dynamics(model), dyn.hamilton_equations(model))
-    n = model.system.n
-    forward, momenta = (elimination(graph, names) for graph in graphs)
-    assert [step.words for step in forward[:n]] == [step.words for step in momenta[:n]]
+    rates = dyn.hamilton_equations(model)  # have the same pivots, then velocities, and the rates after them
+    momenta = elimination(rates, names)
+    assert [step.words for step in steps[:n]] == [step.words for step in momenta[:n]]
     for step in momenta[n : 2 * n]:
-        assert step.value is graphs[1].outputs[f"q{step.joint}_dot"]
-    assert [step.value for step in momenta[2 * n :]] == [graphs[1].outputs[f"p{i}_dot"] for i in reversed(range(n))]
-    lit = [node for step in momenta for node in step.nodes]
-    assert len(set(lit)) == len(lit)
-    assert {node for node in graphs[1].nodes if node.args} == set(lit)
+        assert step.value is rates.outputs[f"q{step.joint}_dot"]
+    assert [step.value for step in momenta[2 * n :]] == [rates.outputs[f"p{i}_dot"] for i in reversed(range(n))]
+    for made, through in ((graph, steps), (rates, momenta)):
+        lit = [node for step in through for node in step.nodes]
+        assert len(set(lit)) == len(lit)  # a node is new once
+        assert {node for node in made.nodes if node.args} == set(lit)
 
 
 def test_what_divides_by_no_pivots_has_no_steps():

@@ -2,7 +2,7 @@
 
 import math
 import re
-from functools import cache
+from functools import cache, partial
 from xml.etree import ElementTree
 
 import numpy as np
@@ -22,7 +22,7 @@ from tests.each_row import each_row
 from viz import cli
 from viz.models.equations import LETTERS, Equations, model_equations
 from viz.models.equations_text import ALL_DIGITS, equations_html, equations_latex, equations_text, plain
-from viz.pages.mathml import notation, typeset
+from viz.pages.mathml import NOTATION, typeset
 
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "exp", "sqrt", "tanh")} | {"abs": abs}
 MANY = 10**6
@@ -133,7 +133,8 @@ MORE = {"where": lambda c, a, b: a if c else b, "minimum": min, "sign": lambda a
 SYMBOLS = plain(ALL_DIGITS)._replace(names=lambda names: {name: "n_" + re.sub(r"\W", "_", name) for name in names})
 
 
-MATHML = notation(ALL_DIGITS)._replace(
+MATHML = NOTATION._replace(
+    number=partial(NOTATION.number, digits=ALL_DIGITS),
     names=lambda names: {name: f"<mi>n_{re.sub(r'[^A-Za-z0-9_]', '_', name)}</mi>" for name in names},
     unnamed="<mi>v{}</mi>".format,
 )

@@ -23,6 +23,7 @@ from viz.typed.text_page import typed_page
 
 SVG = "{http://www.w3.org/2000/svg}"
 FIGURES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig5-residual", "fig6", "fig7a", "fig7b", "fig7c", "law", "scaling")
+FIGURES += ("first-torque",)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def test_every_figure_is_there_as_svg_and_png(paper):
         assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     for name in ("fig1", "fig2", "fig3"):
         assert "digraph" in (folder / f"{name}.dot").read_text()
-    for name in ("fig5", "fig7", "table1", "law", "scaling"):
+    for name in ("fig5", "fig7", "table1", "law", "scaling", "first-torque"):
         assert (folder / f"{name}.csv").read_text().count("\n") > 2
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]  # nothing half written
 
@@ -56,7 +57,7 @@ def test_the_parts_of_the_data_are_those_that_the_docs_list(paper):
 
 def test_there_is_a_progress_line_for_each_part(paper):
     _, _, lines = paper
-    assert [line[:5] for line in lines if line.endswith("...")] == [f"[{k}/8]" for k in range(1, 9)]
+    assert [line[:5] for line in lines if line.endswith("...")] == [f"[{k}/9]" for k in range(1, 10)]
 
 
 def test_equation_3_is_read_off_the_graph(paper):
@@ -218,7 +219,7 @@ def test_the_page_is_self_contained_but_for_the_pages_beside_it(paper):
     assert {link[1:] for link in links if link.startswith("#")} <= {str(each.get("id")) for _, each in found.elements}
     assert not [each for _, each in found.elements if "style" in each]  # the page's policy would not have it
     captions = re.findall(r"<figcaption[^>]*>Figure (\d+)", text)
-    assert [*dict.fromkeys(captions)] == [str(k) for k in range(1, 10)]
+    assert [*dict.fromkeys(captions)] == [str(k) for k in range(1, 11)]
     headings = re.findall(r"<h2>(.*?)</h2>", text)
     assert not set(headings) & set(re.findall(r"<caption>(.*?)</caption>", text))
     assert json.loads((folder / "figures.json").read_text()) == json.loads(json.dumps(data))

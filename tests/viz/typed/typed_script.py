@@ -6,7 +6,9 @@ from typing import Any
 
 from py_mini_racer import MiniRacer
 
-from viz.typed.text_page import script
+from viz.pages.html import asset
+from viz.pages.operations import operations
+from viz.typed.text_page import engine
 
 HELPERS = """
 const edges = (graph) => graph.nodes.reduce((sum, node) => sum + node.args.length, 0);
@@ -42,9 +44,9 @@ function outputsAt(graph, at) {
 
 @cache
 def machine() -> MiniRacer:
-    engine = MiniRacer()
-    engine.eval(f"{script()}\n{HELPERS}")
-    return engine
+    made = MiniRacer()
+    made.eval(f'"use strict";\n{operations()}{asset("viz.pages", "graph.js", "slopes.js")}{engine()}\n{HELPERS}')
+    return made
 
 
 def run_typed(function: str, *given: Any) -> Any:

@@ -148,12 +148,12 @@ function inLimbs({ parents, tree }, limbs, local, across, down) {
 function linesOf({ columns, limbs, tree }, most) {
   const lines = [];
   for (const limb of limbs) {
-    const last = lines.at(-1), parts = Array.from({ length: Math.ceil(limb.length / most) }, (_, k) => limb.slice(k * most, (k + 1) * most));
+    const last = lines.at(-1), parts = inLines(limb, most);
     if (last && parts.length === 1 && last.length + limb.length <= most) last.push(...limb); else lines.push(...parts);
   }
   const rest = columns.map((_, i) => i).filter((i) => !tree[i]);
   if (lines.length === 1 && lines[0].length + rest.length <= most) return [[...lines[0], ...rest]];
-  return [...Array.from({ length: Math.ceil(rest.length / most) }, (_, k) => rest.slice(k * most, (k + 1) * most)), ...lines];
+  return [...inLines(rest, most), ...lines];
 }
 
 /** Columns side by side, in as few bands as the picture needs; rows by sweep. */
@@ -206,11 +206,7 @@ function columnsIn(plan, folded, closed, aspect) {
 function bandsFor(widths, heights, aspect = CELL.aspect) {
   const high = heights.reduce((sum, each) => sum + (each ? each + CELL.gap : 0), CELL.title + CELL.gap / 2);
   const scale = (bands) => {
-    const per = Math.ceil(widths.length / bands);
-    let most = 0;
-    for (let i = 0; i < widths.length; i += per) {
-      most = Math.max(most, widths.slice(i, i + per).reduce((sum, each) => sum + each + CELL.beside, 0));
-    }
+    const most = Math.max(0, ...inLines(widths, Math.ceil(widths.length / bands)).map((own) => own.reduce((sum, each) => sum + each + CELL.beside, 0)));
     return Math.min(aspect / (most + 20), 1 / (bands * high + 2 * LEAF.row));
   };
   let best = 1;

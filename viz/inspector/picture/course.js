@@ -23,9 +23,8 @@ function courseView(svg, { record, state }) {
   const names = lines.map(({ name }) => state.called.get(name) ?? name), places = namesIn(names, width - left - right), top = 6 + NAMED.line * (places.at(-1)[1] + 1);
   const all = lines.flatMap(({ values }) => values), low = Math.min(...all), high = Math.max(...all);
   const x = (time) => left + (width - left - right) * (time - t[0]) / (t.at(-1) - t[0] || 1), y = (value) => height - bottom - (height - bottom - top) * (value - low) / (high - low);
-  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  svg.setAttribute("aria-label", `${names.join(", ")} over time`);
-  const word = (words, at, foot, anchor) => { element("text", { x: at, y: foot, class: `tick ${anchor}` }, svg).textContent = words; };
+  filled(svg, { viewBox: `0 0 ${width} ${height}`, "aria-label": `${names.join(", ")} over time` });
+  const word = (words, x, y, anchor) => element("text", { x, y, class: `tick ${anchor}` }, svg, words);
   svg.replaceChildren(drawn("path", { class: "grid", d: `M${left} ${top}V${height - bottom}H${width - right}${low < 0 && high > 0 ? `M${left} ${y(0)}H${width - right}` : ""}` }));
   [low, high].forEach((value) => word(brief(value), left - 5, y(value) + 4, "end"));
   [t[0], t.at(-1)].forEach((time, k) => word(`${brief(time)} s`, x(time), height - 6, k ? "end" : "start"));

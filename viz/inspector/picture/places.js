@@ -128,12 +128,10 @@ function layersOf(below, above) {
 function broken(layers, widths, step) {
   const wide = (nodes) => nodes.reduce((sum, node) => sum + widths[node] + LAYERS.gap, 0);
   const limit = Math.max(240, 1.3 * Math.sqrt(wide(widths.map((_, i) => i)) * step));
-  return layers.flatMap((layer) => {
-    const size = Math.ceil(layer.length / Math.ceil(wide(layer) / limit)), rows = [];
-    for (let i = 0; i < layer.length; i += size) rows.push(layer.slice(i, i + size));
-    return rows;
-  });
+  return layers.flatMap((layer) => inLines(layer, Math.ceil(layer.length / Math.ceil(wide(layer) / limit))));
 }
+/** A list in lines of so many. */
+const inLines = (list, most) => Array.from({ length: Math.ceil(list.length / most) }, (_, k) => list.slice(k * most, (k + 1) * most));
 
 /** Put the nodes of a layer, in order, where they wish to be, as far as they do not overlap.
  *

@@ -1,7 +1,5 @@
 """Energy and the step: how fast the error of a motion shrinks with the step, by the order of its method."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from typing import NamedTuple
@@ -61,24 +59,12 @@ def energy_and_step(subject: Subject) -> Screen:
     )
 
 
-def _of_euler(subject: Subject, measured: Measured) -> str:
-    """Sentence on the errors of Euler's method with the same steps."""
-    t_end, steps = measured.t_end, measured.steps
-    exact = _end(subject, t_end, FINE * steps)
-    ends = [_end(subject, t_end, factor * steps, "euler") for factor in (1, 2)]
-    if exact is None or any([end is None for end in ends]):
-        return ""
-    coarse, finer = (float(np.abs(end - exact).max()) for end in ends if end is not None)
-    if finer <= measured.rounding:
-        return "Euler’s method is exact here, too."
-    return f"The error of Euler’s method becomes smaller by a factor of {number(coarse / finer)} alone."
-
-
 class Measured(NamedTuple):
     """Errors of rk4 at the end of a motion, {1: by `steps` steps, 2: by twice as many}, and what rounding makes of them."""
 
     t_end: float
     steps: int
+    exact: Array  # coordinates at the end
     errors: dict[int, float]
     rounding: float
 
@@ -106,6 +92,17 @@ class Measured(NamedTuple):
         return f"{order} {factor}" if usual else f"{factor} Where the rate is smooth one would expect 16. {order}"
 
 
+def _of_euler(subject: Subject, measured: Measured) -> str:
+    """Sentence on the errors of Euler's method with the same steps."""
+    ends = [_end(subject, measured.t_end, factor * measured.steps, "euler") for factor in (1, 2)]
+    coarse, finer = (float(np.abs(end - measured.exact).max()) for end in ends)
+    if math.isnan(coarse + finer):
+        return ""
+    if finer <= measured.rounding:
+        return "Euler’s method is exact here, too."
+    return f"The error of Euler’s method becomes smaller by a factor of {number(coarse / finer)} alone."
+
+
 def _measured(subject: Subject) -> Measured:
     """Errors of a motion and of steps for which the error has not grown beyond its order, nor drowned in rounding.
 
@@ -115,13 +112,11 @@ def _measured(subject: Subject) -> Measured:
     t_end, last = min(subject.scene.t_end, LONGEST_MOTION), None
     for _ in range(HALVINGS):
         for steps in STEPS:
-            exact, coarse, finer = (_end(subject, t_end, factor * steps) for factor in (FINE, 1, 2))
-            if exact is None or coarse is None or finer is None:
-                continue
+            exact, *ends = (_end(subject, t_end, factor * steps) for factor in (FINE, 1, 2))
             size = max(float(np.abs(exact).max()), float(np.abs(subject.q).max()))
-            errors = {1: float(np.abs(coarse - exact).max()), 2: float(np.abs(finer - exact).max())}
-            if errors[1] <= SMALL_ERROR * size:
-                last = Measured(t_end, steps, errors, ROUNDING_ERROR * size)
+            errors = {factor: float(np.abs(end - exact).max()) for factor, end in enumerate(ends, start=1)}
+            if errors[1] <= SMALL_ERROR * size and not math.isnan(errors[2]):
+                last = Measured(t_end, steps, exact, errors, ROUNDING_ERROR * size)
                 if errors[2] > last.rounding:
                     return last
         if last is not None:
@@ -130,10 +125,9 @@ def _measured(subject: Subject) -> Measured:
     raise RuntimeError(f"{subject.scene.name} moves too fast for a lesson: rk4 misses it within {2.0 * t_end:g} s")
 
 
-def _end(subject: Subject, t_end: float, steps: int, method: str = "rk4") -> Array | None:
-    """The coordinates at the end of a motion; None of one that is not whole."""
+def _end(subject: Subject, t_end: float, steps: int, method: str = "rk4") -> Array:
+    """The coordinates at the end of a motion; NaN of one that is not whole."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # that an error is large is what is looked for
         run = simulate(subject.system, subject.q, subject.qd, t_end, method, dt=t_end / steps)
-    end: Array = run.q[-1]
-    return end if run.stats.success else None
+    return run.q[-1] if run.stats.success else np.full(len(subject.q), np.nan)

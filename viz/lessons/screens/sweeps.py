@@ -89,7 +89,7 @@ def formula_graph(subject: Subject) -> Screen:
 def backward_sweep(subject: Subject) -> Screen:
     """The screen on slopes."""
     graph, count = lagrangian_graph(subject.system), subject.system.n + subject.system.nq
-    slopes = _slopes(subject, graph)
+    slopes = _swept(subject, graph, "slopes")
     return Screen(
         "sweeps",
         "Backward: the slopes of L",
@@ -149,7 +149,7 @@ def forward_sweep(subject: Subject) -> Screen:
             subject,
             graph,
             "rates",
-            _rates(subject, graph),
+            _swept(subject, graph, "rates"),
             "The graph of p, with the values of all nodes. Inputs are at the bottom.",
             "Write the rate of every node beside it, from the bottom to the top, with four digits. Begin with q̇ at q and q̈ at q̇; "
             "a parameter has the rate 0.",
@@ -245,26 +245,18 @@ def _values(subject: Subject, graph: Graph) -> dict[Node, float]:
     return {node: float(value) for node, value in found.items() if node.value is None}
 
 
-def _slopes(subject: Subject, graph: Graph) -> dict[Node, float]:
-    """Slopes of the one output by all nodes that are no numbers, by a backward sweep."""
+def _swept(subject: Subject, graph: Graph, kind: str) -> dict[Node, float]:
+    """Slopes of the one output by all nodes that are no numbers, backward, or their rates, forward from the inputs'."""
     nodes = [node for node in graph.nodes if node.value is None]
-    bars = cotangents({graph.only_output(): cg.constant(1.0)}, nodes)
-    return _evaluated(subject, graph, dict(zip(nodes, bars, strict=True)))
-
-
-def _rates(subject: Subject, graph: Graph) -> dict[Node, float]:
-    """Rates of all nodes that are no numbers, by a forward sweep from those of q, q̇ and the time."""
-    nodes = [node for node in graph.nodes if node.value is None]
-    seeds = {node: cg.constant(subject.rates.get(str(node.name), 0.0)) for node in nodes if not node.args}
-    return _evaluated(subject, graph, dict(zip(nodes, changes(seeds, nodes), strict=True)))
-
-
-def _evaluated(subject: Subject, graph: Graph, nodes: Mapping[Node, Node]) -> dict[Node, float]:
-    """{node: the value of what it stands for}."""
     if not nodes:
         return {}
-    found = subject.evaluate(Graph(graph.inputs, {str(k): node for k, node in enumerate(nodes.values())}))
-    return dict(zip(nodes, found.tolist(), strict=True))
+    if kind == "slopes":
+        found = cotangents({graph.only_output(): cg.constant(1.0)}, nodes)
+    else:
+        seeds = {node: cg.constant(subject.rates.get(str(node.name), 0.0)) for node in nodes if not node.args}
+        found = changes(seeds, nodes)
+    values = subject.evaluate(Graph(graph.inputs, {str(k): node for k, node in enumerate(found)}))
+    return dict(zip(nodes, values.tolist(), strict=True))
 
 
 def _rows(subject: Subject, graph: Graph, kind: str, swept: Mapping[Node, float]) -> list[dict[str, object]]:

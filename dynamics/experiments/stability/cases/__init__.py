@@ -3,7 +3,7 @@
 from cgraph._shared import memo, or_nearest
 
 from ...accuracy_task import RTOL, Criterion, StabilityCase
-from . import chains, extremes, fields, orbits, rotation, stiff
+from . import chains, extremes, fields, rotation, stiff
 
 __all__ = ["RTOL", "Criterion", "StabilityCase", "load", "names", "table"]
 
@@ -11,7 +11,7 @@ __all__ = ["RTOL", "Criterion", "StabilityCase", "load", "names", "table"]
 @memo(1)
 def table() -> dict[str, StabilityCase]:
     """{name: case}, made when first asked for: to import the package need not build a chain of a thousand links."""
-    return {case.name: case for rows in (stiff, chains, orbits, rotation, fields, extremes) for case in rows.cases()}
+    return {case.name: case for rows in (stiff, chains, rotation, fields, extremes) for case in rows.cases()}
 
 
 def names() -> list[str]:

@@ -8,52 +8,34 @@ from collections.abc import Sequence
 import cgraph as cg
 
 from ....equations.equations_of_motion import momentum
-from ....multibody.builders.planar_arm import planar_arm
+from ....multibody.builders import planar_arm
 from ....multibody.trees.mechanism import Body, Joint, Mechanism
 from ....systems.system import System
-from ...accuracy_task import GROWN, RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
+from ...accuracy_task import GROWN, RTOL, SLACK, Criterion, StabilityCase, case, conserved, energy_criterion
 
 GRAVITY = 9.81  # m/s^2
 UNIT = 2.0**-53  # rounding of float64
 
 
 def _two_links(
-    name: str,
-    about: str,
-    arm: Mechanism,
-    fastest: float,
-    bend: float,
-    criteria: tuple[Criterion, ...],
-    growth: float | None,
+    name: str, about: str, arm: Mechanism, fastest: float, bend: float, growth: float | None, *criteria: Criterion
 ) -> StabilityCase:
     """Two links let go straight, at rest, for a hundred radians of the fastest mode [rad/s], at most 2 s."""
-    return StabilityCase(
-        name=name,
-        about=about,
-        model=arm,
-        q=(1.0, 0.0),
-        qd=(0.0, 0.0),
-        size=(1.0, bend, math.sqrt(GRAVITY), bend * fastest),
-        t_end=min(2.0, 100.0 / fastest),
-        criteria=criteria,
-        stiff=fastest > 1e3,
-        growth=growth,
-        series=growth is not None,
-    )
+    size, t_end = (1.0, bend, math.sqrt(GRAVITY), bend * fastest), min(2.0, 100.0 / fastest)
+    more = {"size": size, "stiff": fastest > 1e3, "growth": growth, "series": growth is not None}
+    return case(name, about, arm, (1.0, 0.0, 0.0, 0.0), t_end, *criteria, **more)
 
 
 def mass_ratio(ratio: float, growth: float) -> StabilityCase:
     """Two points on unit rods without mass, the lower `ratio` times as heavy as the upper."""
     arm = planar_arm([1.0, ratio], [1.0, 1.0], mass_model="point", gravity=GRAVITY)
-    about = (
-        "a light link under a heavy one" if ratio < 1.0 else "a light link above a heavy one swings fast in its pull"
-    )
+    about = f"a light link {'under a heavy one' if ratio < 1.0 else 'above a heavy one swings fast in its pull'}"
     fastest = math.sqrt(2.0 * GRAVITY * max(ratio, 1.0))  # of the upper point between the two rods
     bend = 1.0 / max(ratio, 1.0)  # gravity over the square of that
     lost = UNIT * ratio  # the light mass is rounded in the sum with the heavy one
     kept = energy_criterion(GRAVITY * (1.0 + 2.0 * ratio))
-    criteria = (kept, Criterion("error", SLACK * max(RTOL * growth, lost), GROWN))
-    return _two_links(f"mass ratio {ratio:g}", about, arm, fastest, bend, criteria, growth)
+    error = Criterion("error", SLACK * max(RTOL * growth, lost), GROWN)
+    return _two_links(f"mass ratio {ratio:g}", about, arm, fastest, bend, growth, kept, error)
 
 
 def length_ratio(ratio: float, growth: float | None) -> StabilityCase:
@@ -64,8 +46,8 @@ def length_ratio(ratio: float, growth: float | None) -> StabilityCase:
     # Of a long link below, the float64 accelerations themselves have a relative error of 2^-53 ratio^2.
     why = "the short link's inertia is rounded in the sum with the long one's, larger by the square of the ratio"
     lost = Criterion("energy", SLACK * max(RTOL, UNIT * ratio**2), why, GRAVITY * (2.0 + ratio))
-    criteria = (energy_criterion(GRAVITY * (2.0 + ratio)) if ratio < 1.0 else lost,)
-    return _two_links(f"length ratio {ratio:g}", about, arm, fastest, 1.0, criteria, growth)
+    kept = energy_criterion(GRAVITY * (2.0 + ratio)) if ratio < 1.0 else lost
+    return _two_links(f"length ratio {ratio:g}", about, arm, fastest, 1.0, growth, kept)
 
 
 def nearly_singular(small: float) -> StabilityCase:
@@ -78,21 +60,11 @@ def nearly_singular(small: float) -> StabilityCase:
             0.5 * (small * qd[1] ** 2) - 0.5 * (small * apart**2),
         ]
 
-    lost = UNIT / small
-    return StabilityCase(
-        name=f"mass matrix of condition {4 / small:.0e}",
-        about="the smallest inertia is lost when it is added to the largest",
-        model=System(lagrangian, ["first", "second"]),
-        q=(1.0, 0.5),
-        qd=(0.0, 0.0),
-        t_end=20.0,
-        criteria=(
-            Criterion("error", max(SLACK * RTOL, 200.0 * lost), "rounding changes the small inertia and its frequency"),
-            energy_criterion(10.0),
-        ),
-        size=(1.0, 1.0, 2.0, 2.0),
-        growth=1.8,
-    )
+    about = "the smallest inertia is lost when it is added to the largest"
+    model, start, size = System(lagrangian, ["first", "second"]), (1.0, 0.5, 0.0, 0.0), (1.0, 1.0, 2.0, 2.0)
+    why, name = "rounding changes the small inertia and its frequency", f"mass matrix of condition {4 / small:.0e}"
+    error = Criterion("error", max(SLACK * RTOL, 200.0 * (UNIT / small)), why)
+    return case(name, about, model, start, 20.0, error, energy_criterion(10.0), size=size, growth=1.8)
 
 
 def massless_links() -> StabilityCase:
@@ -104,30 +76,16 @@ def massless_links() -> StabilityCase:
         Body("second", joint, "first"),
         Body("third", joint, "second", mass=1.0, center=(0.0, 0.0, -0.25), inertia=(0.02, 0.02, 0.001)),
     ]
-    return StabilityCase(
-        name="massless links with armature",
-        about="links without mass between motors: inertia only by the armatures",
-        model=Mechanism(bodies),
-        q=(0.7, 0.4, -0.3),
-        qd=(0.0,) * 3,
-        t_end=2.0,
-        criteria=(energy_criterion(10.0),),
-        growth=30.0,
-    )
+    name, about = "massless links with armature", "links without mass between motors: inertia only by the armatures"
+    start = (0.7, 0.4, -0.3, 0.0, 0.0, 0.0)
+    return case(name, about, Mechanism(bodies), start, 2.0, energy_criterion(10.0), growth=30.0)
 
 
 def long_chain(n: int, t_end: float) -> StabilityCase:
     """n equal rods, 1 kg and 1 m in all, let go straight at 45 degrees."""
-    return StabilityCase(
-        name=f"{n} links",
-        about="many links: a dense mass matrix of condition n^4, and a fast whip at the end",
-        model=planar_arm([1.0 / n] * n, [1.0 / n] * n, gravity=GRAVITY),
-        q=(math.pi / 4,) + (0.0,) * (n - 1),
-        qd=(0.0,) * n,
-        t_end=t_end,
-        criteria=(energy_criterion(GRAVITY),),
-        series=False,
-    )
+    about = "many links: a dense mass matrix of condition n^4, and a fast whip at the end"
+    arm, start = planar_arm([1.0 / n] * n, [1.0 / n] * n, gravity=GRAVITY), (math.pi / 4,) + (0.0,) * (2 * n - 1)
+    return case(f"{n} links", about, arm, start, t_end, energy_criterion(GRAVITY), series=False)
 
 
 def zero_gravity() -> StabilityCase:
@@ -137,20 +95,10 @@ def zero_gravity() -> StabilityCase:
     def spin(q: Sequence[cg.Node], qd: Sequence[cg.Node]) -> cg.Node:
         return momentum(arm).outputs["p0"]
 
-    return StabilityCase(
-        name="zero gravity",
-        about="nothing but inertia: energy and angular momentum stay",
-        model=arm,
-        q=(0.3, 0.5, -0.8),
-        qd=(1.0, -2.0, 3.0),
-        t_end=10.0,
-        criteria=(
-            energy_criterion(1.0),
-            Criterion("angular momentum", SLACK * RTOL, "the system may be turned as a whole", 1.0),
-        ),
-        growth=110.0,
-        invariants=conserved(**{"angular momentum": spin}),
-    )
+    name, about = "zero gravity", "nothing but inertia: energy and angular momentum stay"
+    start, invariants = (0.3, 0.5, -0.8, 1.0, -2.0, 3.0), conserved(**{"angular momentum": spin})
+    kept = energy_criterion(1.0), Criterion("angular momentum", SLACK * RTOL, "the system may be turned as a whole")
+    return case(name, about, arm, start, 10.0, *kept, growth=110.0, invariants=invariants)
 
 
 def cases() -> list[StabilityCase]:

@@ -5,7 +5,7 @@ import math
 import cgraph as cg
 
 from ....systems.system import System
-from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, energy_criterion
+from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, case, energy_criterion
 
 STIFFNESS = 9.81  # 1/s^2, gravity over length
 TINY = 5e-324  # the smallest positive float64
@@ -20,8 +20,8 @@ def simple_pendulum(stiffness: float = STIFFNESS) -> System:
 def upright(angle: float, name: str, t_end: float, growth: float) -> StabilityCase:
     """Let go at rest, at or next to the upright."""
     about = "an unstable equilibrium: what is there at the start grows by e^(3.13 t)"
-    size = math.pi, math.sqrt(STIFFNESS)
-    return _pendulum(name, about, (angle, 0.0), t_end, size, growth, energy_criterion(2.0 * STIFFNESS))
+    size, kept = (math.pi, math.sqrt(STIFFNESS)), energy_criterion(2.0 * STIFFNESS)
+    return case(name, about, simple_pendulum(), (angle, 0.0), t_end, kept, size=size, growth=growth)
 
 
 def large_angle(angle: float) -> StabilityCase:
@@ -35,42 +35,31 @@ def large_angle(angle: float) -> StabilityCase:
     )
     error = Criterion("error 0", SLACK * max(UNIT, RTOL / angle), "the angle relative to its own size")
     kept = Criterion("energy", max(SLACK * RTOL, 100.0 * ulp), why, 2.0 * STIFFNESS)
-    return _pendulum(name, about, (angle, 0.0), 10.0, (angle, math.sqrt(STIFFNESS)), None, error, kept)
+    size = (angle, math.sqrt(STIFFNESS))
+    return case(name, about, simple_pendulum(), (angle, 0.0), 10.0, error, kept, size=size)
 
 
 def spinning(velocity: float, growth: float) -> StabilityCase:
     """A pendulum at a high speed, for a thousand radians."""
     name, about = f"velocity of {velocity:g} rad/s", "gravity is a small change of a large speed"
-    kept = Criterion("energy", SLACK * RTOL, "nothing takes energy in or out", 0.5 * velocity**2)
-    return _pendulum(name, about, (0.5, velocity), 1e3 / velocity, (1e3, velocity), growth, kept)
+    start, t_end, size, kept = (0.5, velocity), 1e3 / velocity, (1e3, velocity), energy_criterion(0.5 * velocity**2)
+    return case(name, about, simple_pendulum(), start, t_end, kept, size=size, growth=growth)
 
 
 def creeping() -> StabilityCase:
     """The smallest velocity there is, without a force: the angle must neither jump nor be lost."""
     about = "products of the velocity vanish; the motion must still be uniform"
     exact, size = Criterion("error 1", 0.0, "no force acts: the velocity is exactly the start's"), (1024.0 * TINY, TINY)
-    return _pendulum("smallest velocity", about, (0.0, TINY), 1024.0, size, 1.0, exact, stiffness=0.0)
+    model, start = simple_pendulum(0.0), (0.0, TINY)
+    return case("smallest velocity", about, model, start, 1024.0, exact, size=size, growth=1.0)
 
 
 def hanging() -> StabilityCase:
     """The smallest velocity at the lower equilibrium."""
     about = "numbers that underflow everywhere must not become NaN or grow"
     error = Criterion("error", RTOL, "nothing moves that can be told from rest; sizes are 1 rad and 1 rad/s")
-    return _pendulum("smallest velocity, hanging", about, (0.0, TINY), 10.0, (1.0, 1.0), 1.0, error)
-
-
-def _pendulum(
-    name: str,
-    about: str,
-    start: tuple[float, float],
-    t_end: float,
-    size: tuple[float, float],
-    growth: float | None,
-    *criteria: Criterion,
-    stiffness: float = STIFFNESS,
-) -> StabilityCase:
-    model = simple_pendulum(stiffness)
-    return StabilityCase(name, about, model, start[:1], start[1:], t_end, criteria=criteria, size=size, growth=growth)
+    name, start, size = "smallest velocity, hanging", (0.0, TINY), (1.0, 1.0)
+    return case(name, about, simple_pendulum(), start, 10.0, error, size=size, growth=1.0)
 
 
 def cases() -> list[StabilityCase]:

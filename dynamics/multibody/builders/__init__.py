@@ -1,1 +1,0 @@
-"""Mechanisms from a few numbers."""
